@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "common/landmarks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <fstream>
+
+#include "common/error.h"
+
+namespace supine {
+namespace {
+
+std::vector<std::string> split(std::string line) {
+  if (!line.empty() && line.back() == '\r') line.pop_back();
+  std::vector<std::string> fields;
+  std::size_t start = 0;
+  while (true) {
+    const std::size_t comma = line.find(',', start);
+    fields.push_back(line.substr(start, comma - start));
+    if (comma == std::string::npos) return fields;
+    start = comma + 1;
+  }
+}
+
+double coordinate(const std::string& field, const std::string& place) {
+  const std::size_t first = field.find_first_not_of(' ');
+  double value = 0;
+  const char* end = field.data() + field.size();
+  const auto parsed = std::from_chars(field.data() + std::min(first, field.size()), end, value);
+  if (parsed.ec != std::errc() || parsed.ptr != end)
+    throw InputError(fmt::format("{}: '{}' is not a number; landmarks are name,x,y,z in mm", place, field));
+  return value;
+}
+
+}  // namespace
+
+Landmarks read_landmarks(const std::filesystem::path& file, const std::string& frame) {
+  std::ifstream stream(file);
+  if (!stream) throw InputError("landmark file " + file.string() + " cannot be read");
+  std::string line;
+  if (!std::getline(stream, line) || split(line) != std::vector<std::string>{"name", "x", "y", "z"})
+    throw InputError(file.string() + ":1: the header must be name,x,y,z");
+
+  Landmarks landmarks;
+  std::vector<Eigen::Vector3d> points;
+  for (int number = 2; std::getline(stream, line); ++number) {
+    if (line.empty() || line == "\r") continue;
+    const std::string place = fmt::format("{}:{}", file.string(), number);
+    const auto fields = split(line);
+    if (fields.size() != 4)
+      throw InputError(fmt::format("{}: {} fields, 4 expected: name,x,y,z", place, fields.size()));
+    if (std::find(landmarks.names.begin(), landmarks.names.end(), fields[0]) != landmarks.names.end())
+      throw InputError(fmt::format("{}: landmark '{}' stands twice; each name once", place, fields[0]));
+    landmarks.names.push_back(fields[0]);
+    points.emplace_back(coordinate(fields[1], place), coordinate(fields[2], place), coordinate(fields[3], place));
+    if (frame == "RAS") points.back().head<2>() *= -1;
+  }
+  landmarks.points.resize(static_cast<Eigen::Index>(points.size()), 3);
+  for (std::size_t i = 0; i < points.size(); ++i) landmarks.points.row(static_cast<Eigen::Index>(i)) = points[i];
+  return landmarks;
+}
+
+void write_landmarks(const Landmarks& landmarks, const std::filesystem::path& file) {
+  std::ofstream stream(file);
+  stream << "name,x,y,z\n";
+  for (std::size_t i = 0; i < landmarks.names.size(); ++i) {
+    const auto p = landmarks.points.row(static_cast<Eigen::Index>(i));
+    stream << fmt::format("{},{:.3f},{:.3f},{:.3f}\n", landmarks.names[i], p.x(), p.y(), p.z());
+  }
+  if (!stream.flush()) throw Error("writing " + file.string() + " failed (disk full?)");
+}
+
+}  // namespace supine

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "common/outputs.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstring>
+#include <system_error>
+
+#include "common/error.h"
+
+namespace supine {
+namespace {
+
+constexpr int max_registered = 256;
+constexpr std::size_t max_path = 1024;
+
+// Fixed storage: a signal handler may call unlink() but must not allocate or lock.
+char registered_path[max_registered][max_path];
+std::atomic<bool> registered_in_use[max_registered];
+
+void register_temporary(const std::string& path) {
+  if (path.size() >= max_path) throw InputError("output path is longer than 1023 characters: " + path);
+  for (int i = 0; i < max_registered; ++i) {
+    if (registered_in_use[i].load()) continue;
+    std::strncpy(registered_path[i], path.c_str(), max_path - 1);
+    registered_in_use[i].store(true);
+    return;
+  }
+  throw Error("more than 256 output files at once");
+}
+
+void unregister_temporary(const std::string& path) {
+  for (int i = 0; i < max_registered; ++i)
+    if (registered_in_use[i].load() && path == registered_path[i]) registered_in_use[i].store(false);
+}
+
+extern "C" void remove_temporaries_and_exit(int) {
+  for (int i = 0; i < max_registered; ++i)
+    if (registered_in_use[i].load()) unlink(registered_path[i]);
+  constexpr char message[] = "\ninterrupted: nothing was left half-written; the same command starts again\n";
+  [[maybe_unused]] const auto written = write(STDERR_FILENO, message, sizeof message - 1);
+  _exit(130);
+}
+
+}  // namespace
+
+Outputs::~Outputs() {
+  for (const auto& [temporary, target] : staged_) {
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
+    unregister_temporary(temporary.string());
+  }
+}
+
+std::filesystem::path Outputs::stage(const std::filesystem::path& target) {
+  namespace fs = std::filesystem;
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  std::error_code failed;
+  fs::create_directories(folder, failed);
+  if (!fs::is_directory(folder))
+    throw InputError("output folder " + folder.string() + " cannot be created" +
+                     (failed ? ": " + failed.message() : std::string()) + "; choose another with -o");
+  if (fs::exists(target) && !force_)
+    throw InputError("output file " + target.string() + " exists; add --force to replace it or choose another with -o");
+
+  const fs::path temporary =
+      folder / ("." + target.stem().string() + ".part" + std::to_string(getpid()) + target.extension().string());
+  const int descriptor = open(temporary.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0644);
+  if (descriptor < 0)
+    throw InputError("output folder " + folder.string() + " is not writable: " + std::strerror(errno) +
+                     "; choose another with -o");
+  close(descriptor);
+  register_temporary(temporary.string());
+  staged_.emplace_back(temporary, target);
+  return temporary;
+}
+
+void Outputs::commit() {
+  for (const auto& [temporary, target] : staged_) {
+    std::filesystem::rename(temporary, target);
+    unregister_temporary(temporary.string());
+  }
+  staged_.clear();
+}
+
+void install_interrupt_handler() {
+  std::signal(SIGINT, remove_temporaries_and_exit);
+  std::signal(SIGTERM, remove_temporaries_and_exit);
+}
+
+}  // namespace supine

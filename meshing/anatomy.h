@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "meshing/muscle_distance.h"
+#include "meshing/tet_mesh.h"
+
+namespace supine::meshing {
+
+/// The anatomical frame of one breast, computed once per case from the imaged (prone) mesh and the muscle.
+struct Anatomy {
+  std::string side;                     ///< left or right
+  Eigen::Vector3d outward;              ///< unit; mean outward normal of the muscle under the mound
+  Eigen::Vector3d lateral;              ///< unit, orthogonal to outward; toward the patient's own outer side (+x LPS for left)
+  Eigen::Vector3d head;                 ///< unit, orthogonal to both; toward the head
+  Eigen::Vector3d foot_centre_mm;       ///< on the muscle, centre of the mound's footprint
+  double foot_radius_mm = 0;            ///< mean radius of the foot: where the tissue over the muscle has come down to its rim thickness
+  double rim_thickness_mm = 0;          ///< of the tissue over the muscle outside the foot
+  double mound_height_mm = 0;           ///< largest thickness over the muscle
+  Eigen::VectorXd foot_fourier;         ///< foot radius at azimuth θ (from lateral toward head): c0 + Σ_m c_m cos mθ + s_m sin mθ, stored c0 c1 s1 c2 s2 …, mm
+  Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor> q;  ///< #points; (lateral, head) from the foot's centre over foot_radius_mm
+  Points muscle_normal;                 ///< #points by 3, unit outward muscle normal (∇φ) at each imaged point
+  Eigen::VectorXd thickness_mm;         ///< #points; φ at each imaged point: height over the muscle
+  int nipple_point = -1;                ///< skin point furthest from the muscle within the mound, or where the nipple tissue is
+  std::shared_ptr<const MuscleDistance> muscle;
+
+  /// Radius of the foot at azimuth @p theta (rad, from lateral toward head), mm.
+  double foot_radius_at(double theta) const;
+  /// Signed distance of a material point (given by its q) from the foot curve, mm; > 0 outside the mound.
+  double from_foot_mm(const Eigen::Vector2d& q_point) const;
+  /// Name of the area a skin point belongs to: "nipple area", "upper outer", "lower outer", "upper inner",
+  /// "lower inner" inside the foot; "fold", "sternal edge", "lateral edge", "upper edge" outside.
+  std::string area_name(const Eigen::Vector2d& q_point) const;
+};
+
+/// All names area_name() can return, in the order tables list them.
+const std::vector<std::string>& area_names();
+
+/// @param mesh  imaged mesh with its muscle sheet
+/// @param side  left or right
+/// @throws InputError  no inner or no skin faces, no mound over the muscle
+Anatomy compute_anatomy(const TetMesh& mesh, const std::string& side);
+
+}  // namespace supine::meshing

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <ceres/jet.h>
+
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "simulation/parameter.h"
+
+namespace supine::meshing {
+struct Anatomy;
+struct TetMesh;
+}  // namespace supine::meshing
+
+namespace supine::simulation {
+
+/// A value and its derivative with respect to the one parameter that is being varied.
+using Dual = ceres::Jet<double, 1>;
+
+template <class T>
+struct Fields;
+
+/// A non-numeric choice of an effect in model.toml.
+struct OptionRow {
+  std::string name;
+  std::string default_value;
+  std::vector<std::string> values;  ///< what may be written
+  std::string meaning;
+};
+
+/// What an effect may look at when it sets fields.
+struct Scene {
+  const meshing::TetMesh& mesh;        ///< imaged
+  const meshing::Anatomy& anatomy;
+  std::string pose;                    ///< prone, supine, …
+};
+
+/// A catalogue entry: a few parameters that change fields of the mechanical terms.
+/// At the null values of all its parameters an effect leaves every field bit for bit as it was.
+class Effect {
+ public:
+  virtual ~Effect() = default;
+  virtual std::string name() const = 0;
+  virtual std::string meaning() const = 0;
+  virtual const std::vector<Parameter>& parameters() const = 0;
+  virtual const std::vector<OptionRow>& options() const;
+  /// @param values   one per row of parameters()
+  /// @param options  every option of options(), by name
+  virtual void apply(const Scene& scene, std::span<const Dual> values,
+                     const std::map<std::string, std::string>& options, Fields<Dual>& fields) const = 0;
+};
+
+/// The catalogue, in the order tables list it.
+const std::vector<const Effect*>& catalogue();
+
+/// @return nullptr for an unknown name
+const Effect* find_effect(const std::string& name);
+
+/// Rows of the base model, named by their place in model.toml: "breast.young_modulus_kpa", "skin.thickness_mm", …
+const std::vector<Parameter>& base_parameters();
+
+}  // namespace supine::simulation

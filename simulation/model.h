@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace supine::simulation {
+
+/// A number of the model: fixed, or free in calibration.
+struct Setting {
+  double value = 0;
+  bool free = false;               ///< written as a table in model.toml
+  std::optional<double> prior_sd;  ///< same unit as value, > 0
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();
+};
+
+enum class BulkLaw { neo_hookean, corotational, corotational_qr };
+enum class SkinLaw { neo_hookean, corotational };
+enum class Compression { tension_field, full };
+enum class InterfaceKind { sliding, fixed };
+enum class CutKind { elastic, held };
+enum class DensityReference { imaged, undeformed };
+
+/// One [[effect]] of model.toml; parameter and option names are those of its catalogue entry.
+struct EffectSetting {
+  std::string name;
+  std::map<std::string, Setting> parameters;
+  std::map<std::string, std::string> options;
+};
+
+/// model.toml: what is believed. Units in the names; moduli are Young's.
+struct Model {
+  struct {
+    BulkLaw law = BulkLaw::corotational;
+    Setting young_modulus_kpa{0.30};
+    Setting poisson_ratio{0.45};
+    Setting density_kg_m3{1000};
+    DensityReference density_refers_to = DensityReference::imaged;
+  } breast;
+  struct {
+    SkinLaw law = SkinLaw::corotational;
+    Setting young_modulus_kpa{22.72};
+    Setting thickness_mm{1.5};
+    Compression compression = Compression::tension_field;
+    Setting compression_share{0.05};
+    std::optional<Setting> poisson_ratio;  ///< corotational skin only; default 0.45
+  } skin;
+  struct {
+    InterfaceKind kind = InterfaceKind::sliding;
+    Setting normal_kpa_per_mm{3.0};
+    Setting tangential_kpa_per_mm{0.01};
+  } interface;
+  struct {
+    CutKind kind = CutKind::elastic;
+    Setting stiffness_kpa_per_mm{1.0};
+  } cut;
+  std::vector<EffectSetting> effects;
+};
+
+}  // namespace supine::simulation
