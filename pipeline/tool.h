@@ -21,6 +21,8 @@ class Run {
   Run(std::string tool, bool force, bool quiet, bool json, int threads, nlohmann::ordered_json options);
 
   int threads() const { return threads_; }
+  /// Whether existing files may be replaced.
+  bool force() const;
 
   /// Notes an input file, whose hash goes into the provenance. @throws InputError when it cannot be read
   const std::filesystem::path& input(const std::filesystem::path& file);
@@ -29,7 +31,7 @@ class Run {
   std::filesystem::path output(const std::filesystem::path& target);
 
   /// The figures of the sidecar that goes beside @p output (X.ext → X.json): fill in at will, keys as in the docs.
-  /// output() of the same target must have been called.
+  /// An output that is itself X.json has no other sidecar: its figures are the file.
   nlohmann::ordered_json& figures(const std::filesystem::path& output);
 
   /// A line for a person, on standard output; silent with --quiet or --json.

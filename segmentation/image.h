@@ -10,16 +10,17 @@ namespace supine::segmentation {
 
 /// Where the voxels of a volume lie in the patient. Patient coordinates are LPS, mm.
 struct Grid {
-  Eigen::Vector3i size = Eigen::Vector3i::Zero();               ///< voxels along the axes i, j, k
-  Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();         ///< > 0
-  Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();          ///< centre of voxel (0, 0, 0)
-  Eigen::Matrix3d direction = Eigen::Matrix3d::Identity();      ///< orthonormal; column a = direction of axis a
+  Eigen::Vector3i size = Eigen::Vector3i::Zero();           ///< voxels along the axes i, j, k
+  Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();     ///< > 0
+  Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();      ///< centre of voxel (0, 0, 0)
+  Eigen::Matrix3d direction = Eigen::Matrix3d::Identity();  ///< orthonormal; column a = direction of axis a
 
   std::size_t count() const { return static_cast<std::size_t>(size.x()) * size.y() * size.z(); }
   double voxel_volume_mm3() const { return spacing_mm.prod(); }
   /// Linear index, i fastest.
   std::size_t index(int i, int j, int k) const {
-    return static_cast<std::size_t>(i) + static_cast<std::size_t>(size.x()) * (j + static_cast<std::size_t>(size.y()) * k);
+    return static_cast<std::size_t>(i) +
+           static_cast<std::size_t>(size.x()) * (j + static_cast<std::size_t>(size.y()) * k);
   }
   bool contains(int i, int j, int k) const {
     return i >= 0 && j >= 0 && k >= 0 && i < size.x() && j < size.y() && k < size.z();

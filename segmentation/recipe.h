@@ -1,14 +1,134 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
+#include <limits>
+#include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "segmentation/tissue.h"
 
 namespace supine::segmentation {
 
-// The segmentation recipe is filled in by the segmentation folder.
-struct Recipe {};
+// A recipe turns a grey volume into a label map by a list of small steps, run in order. The state they share:
+// the grey volume, masks (sets of voxels) with names of the user's choice, and the label map, which starts as air.
+// Points are mm, LPS. Greys are in the unit the volume has at that step: the file's, until Bias makes them per cent.
+// An empty `within` means the whole image.
+
+/// Grey values from lower to upper, both included.
+struct GreyRange {
+  float lower = -std::numeric_limits<float>::infinity();
+  float upper = std::numeric_limits<float>::infinity();
+  bool contains(float grey) const { return grey >= lower && grey <= upper; }
+};
+
+/// Removes the noise floor of a magnitude image: grey = sqrt(max(grey^2 - 2 sigma^2, 0)) (Rician second moment).
+/// Sigma is estimated from the air: median of the greys below `air_below` / sqrt(2 ln 2) (Rayleigh).
+struct NoiseFloor {
+  float air_below = 0;  ///< > 0; the file's greys
+};
+
+/// Divides out the coil's shading: exp of a polynomial in the coordinates, fitted to ln(grey) of one tissue
+/// (fat) with outliers beyond 2.5 sigma dropped. Afterwards that tissue has the grey `level`.
+struct Bias {
+  GreyRange tissue;   ///< candidates, mostly of that tissue
+  int degree = 2;     ///< total degree, 0 to 4
+  float level = 100;  ///< > 0
+};
+
+/// Smooths the grey volume.
+struct Smooth {
+  enum class Kind { median, gaussian };
+  Kind kind = Kind::median;
+  double radius_mm = 0;  ///< > 0; median: half width of the window; gaussian: standard deviation
+};
+
+/// mask = voxels of `within` whose grey lies in `grey`.
+struct Threshold {
+  std::string mask;
+  GreyRange grey;
+  std::string within;
+};
+
+/// mask = what is reached from the seeds through faces, over voxels of `within` whose grey lies in `grey`.
+/// With `confidence`, the range is mean +- multiplier x standard deviation of the region, started from the greys
+/// within `radius_mm` of the seeds and renewed `iterations` times; `grey` then only bounds it.
+struct Grow {
+  struct Confidence {
+    double multiplier = 2.5;  ///< > 0
+    int iterations = 3;       ///< 0 to 50
+    double radius_mm = 3;     ///< > 0
+  };
+  std::string mask;
+  std::vector<Eigen::Vector3d> seeds_mm;  ///< at least one, each inside the image and its range
+  GreyRange grey;
+  std::optional<Confidence> confidence;
+  std::string within;
+};
+
+/// Keeps the `keep_largest` largest components of the mask (0 = any number), and of those the ones of at least min_ml.
+struct Islands {
+  std::string mask;
+  int keep_largest = 0;
+  double min_ml = 0;
+};
+
+/// Fills holes of the mask: components of its complement that do not touch the edge of the image, up to max_ml.
+struct Holes {
+  std::string mask;
+  double max_ml = std::numeric_limits<double>::infinity();
+};
+
+/// mask = (union of `any`, or the whole image when empty) without the union of `without`.
+struct Combine {
+  std::string mask;
+  std::vector<std::string> any;
+  std::vector<std::string> without;
+};
+
+/// Changes a mask by distances between voxel centres: grow, shrink, open (shrink, then grow), close (grow, then
+/// shrink).
+struct Morph {
+  enum class Kind { dilate, erode, open, close };
+  std::string mask;
+  Kind kind = Kind::close;
+  double radius_mm = 0;  ///< > 0
+};
+
+/// mask = voxels of `of` whose centre lies within thickness_mm of the centre of a voxel outside `of`.
+/// The outside of the image does not count.
+struct Layer {
+  std::string mask;
+  std::string of;
+  double thickness_mm = 0;  ///< > 0
+};
+
+/// mask = voxels whose centre lies inside a solid.
+struct Region {
+  enum class Shape { cylinder, sphere, box, halfspace };
+  std::string mask;
+  Shape shape = Shape::cylinder;
+  Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();  ///< of sphere, box; a point of the axis, of the plane
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();      ///< cylinder: its axis; halfspace: towards the inside; not zero
+  Eigen::Vector3d half_mm = Eigen::Vector3d::Zero();    ///< box: half its sides along x, y, z; > 0
+  double radius_mm = 0;                                 ///< cylinder, sphere; > 0
+};
+
+/// Writes `tissue` into the label map wherever the mask is; with `over`, only where one of those tissues was.
+struct Paint {
+  std::string mask;
+  Tissue tissue = Tissue::air;
+  std::vector<Tissue> over;
+};
+
+using Step =
+    std::variant<NoiseFloor, Bias, Smooth, Threshold, Grow, Islands, Holes, Combine, Morph, Layer, Region, Paint>;
+
+/// The steps of a segmentation, in the order in which they run.
+struct Recipe {
+  std::vector<Step> steps;
+};
 
 }  // namespace supine::segmentation

@@ -31,11 +31,14 @@ struct OptionRow {
   std::string meaning;
 };
 
+struct Layout;
+
 /// What an effect may look at when it sets fields.
 struct Scene {
-  const meshing::TetMesh& mesh;        ///< imaged
+  const meshing::TetMesh& mesh;  ///< imaged
   const meshing::Anatomy& anatomy;
-  std::string pose;                    ///< prone, supine, …
+  const Layout& layout;  ///< where the fields live
+  std::string pose;      ///< prone, supine, …
 };
 
 /// A catalogue entry: a few parameters that change fields of the mechanical terms.

@@ -12,8 +12,8 @@ namespace supine::simulation {
 /// A number of the model: fixed, or free in calibration.
 struct Setting {
   double value = 0;
-  bool free = false;               ///< written as a table in model.toml
-  std::optional<double> prior_sd;  ///< same unit as value, > 0
+  bool free = false;                 ///< written as a table in model.toml
+  std::optional<double> prior_sd{};  ///< same unit as value, > 0
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();
 };

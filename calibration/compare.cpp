@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "calibration/compare.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "common/error.h"
+
+namespace supine::calibration {
+namespace {
+
+double mae_of_covered(const ModelToScan& to_scan) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < to_scan.covered.size(); ++i) {
+    if (to_scan.covered[i]) sum += std::abs(to_scan.to_scan.distance_mm[i]);
+  }
+  return sum / static_cast<double>(to_scan.covered.count());
+}
+
+// The area of the corner that weighs most.
+int area_at(const ClosestPoints& closest, Eigen::Index i, const SkinAreas& areas) {
+  int corner = 0;
+  closest.weight.row(i).maxCoeff(&corner);
+  return areas.of_point[closest.node(i, corner)];
+}
+
+Eigen::VectorXd area_sizes_mm2(const ModelSkin& model, const SkinAreas& areas) {
+  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(areas.names.size());
+  for (Eigen::Index t = 0; t < model.triangles().rows(); ++t) {
+    for (const int node : model.triangles().row(t)) sizes[areas.of_point[node]] += model.distance().areas_mm2()[t] / 3;
+  }
+  return sizes;
+}
+
+std::vector<AreaError> area_table(const ModelSkin& model, const SkinAreas& areas, const Comparison& comparison) {
+  std::vector<std::vector<double>> distances(areas.names.size());
+  for (Eigen::Index i = 0; i < comparison.used.size(); ++i) {
+    if (!comparison.used[i]) continue;
+    distances[area_at(comparison.scan_to_model.closest, i, areas)].push_back(comparison.scan_to_model.distance_mm[i]);
+  }
+  const Eigen::VectorXd sizes = area_sizes_mm2(model, areas);
+  std::vector<AreaError> table;
+  for (std::size_t a = 0; a < areas.names.size(); ++a) {
+    if (sizes[a] == 0) continue;
+    const DistanceFigures figures = figures_of(distances[a]);
+    table.push_back({areas.names[a], sizes[a] / 100, static_cast<int>(distances[a].size()), figures.mae_mm,
+                     figures.mean_signed_mm});
+  }
+  return table;
+}
+
+void check_areas(const ModelSkin& model, const SkinAreas& areas) {
+  const int names = static_cast<int>(areas.names.size());
+  for (const int node : model.nodes()) {
+    if (node >= areas.of_point.size() || areas.of_point[node] < 0 || areas.of_point[node] >= names) {
+      throw InputError(fmt::format("skin point {} belongs to no area", node));
+    }
+  }
+}
+
+}  // namespace
+
+Comparison compare(const ModelSkin& model, const Scan& scan, const SkinAreas& areas, const CoverageBounds& bounds) {
+  Comparison result;
+  model_to_scan(scan, model.node_points(), model.node_normals(), bounds, result.model_to_scan);
+  result.mae_study_mm = mae_of_covered(result.model_to_scan);
+  result.covered_fraction = static_cast<double>(result.model_to_scan.covered.count()) / model.nodes().size();
+
+  scan_to_model(model, scan.points(), result.scan_to_model);
+  result.used = !result.scan_to_model.closest.on_border;
+  std::vector<double> distances;
+  for (Eigen::Index i = 0; i < result.used.size(); ++i) {
+    if (result.used[i]) distances.push_back(result.scan_to_model.distance_mm[i]);
+  }
+  if (distances.empty()) {
+    throw InputError(fmt::format(
+        "none of the {} scan points lies over the model's skin: each is closest to the skin's border. Compare with a "
+        "scan of the imaged breast",
+        scan.points().rows()));
+  }
+  result.scan_points_used = static_cast<int>(distances.size());
+  result.scan = figures_of(distances);
+  if (!areas.names.empty()) {
+    check_areas(model, areas);
+    result.areas = area_table(model, areas, result);
+  }
+  return result;
+}
+
+std::vector<LandmarkError> compare_landmarks(const Landmarks& predicted, const Landmarks& measured) {
+  std::vector<LandmarkError> errors;
+  std::vector<std::string> unknown;
+  for (std::size_t i = 0; i < measured.names.size(); ++i) {
+    const auto found = std::find(predicted.names.begin(), predicted.names.end(), measured.names[i]);
+    if (found == predicted.names.end()) {
+      unknown.push_back(measured.names[i]);
+      continue;
+    }
+    const auto row = found - predicted.names.begin();
+    errors.push_back({measured.names[i], (predicted.points.row(row) - measured.points.row(i)).norm()});
+  }
+  if (!unknown.empty()) {
+    throw InputError(
+        fmt::format("measured landmark{} {} {} not among the predicted ones ({}): a landmark has the same name in "
+                    "every pose",
+                    unknown.size() > 1 ? "s" : "", fmt::join(unknown, ", "), unknown.size() > 1 ? "are" : "is",
+                    fmt::join(predicted.names, ", ")));
+  }
+  return errors;
+}
+
+}  // namespace supine::calibration

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "calibration/point_cloud.h"
+
+#include <CGAL/Orthogonal_k_neighbor_search.h>
+#include <CGAL/Search_traits_3.h>
+#include <CGAL/Search_traits_adapter.h>
+#include <CGAL/Simple_cartesian.h>
+#include <CGAL/property_map.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+namespace supine::calibration {
+namespace {
+
+using Kernel = CGAL::Simple_cartesian<double>;
+using Item = std::pair<Kernel::Point_3, int>;
+using Traits = CGAL::Search_traits_adapter<Item, CGAL::First_of_pair_property_map<Item>, CGAL::Search_traits_3<Kernel>>;
+using Search = CGAL::Orthogonal_k_neighbor_search<Traits>;
+
+constexpr int spacing_neighbours = 6;
+constexpr double least_root = 1e-3;
+
+struct Fit {
+  Eigen::Vector3d foot, normal;
+  double curvature;
+};
+
+// Paraboloid of revolution over the plane of the neighbours.
+Fit fit_surface(const Points& around) {
+  const Eigen::RowVector3d centre = around.colwise().mean();
+  const Points offset = around.rowwise() - centre;
+  const Eigen::Matrix3d scatter = offset.transpose() * offset;
+  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors();
+  const Points local = offset * axes;  // height, u, v
+  const double reach = local.rightCols<2>().rowwise().norm().maxCoeff();
+  const Eigen::ArrayX2d uv = local.rightCols<2>() / reach;  // of order one, for the condition of the fit
+  Eigen::MatrixX4d columns(around.rows(), 4);
+  columns << Eigen::VectorXd::Ones(around.rows()), uv, 0.5 * uv.square().rowwise().sum();
+  const Eigen::Vector4d c = columns.colPivHouseholderQr().solve(local.col(0));
+  const Eigen::Vector3d normal = Eigen::Vector3d(1, -c[1] / reach, -c[2] / reach).normalized();
+  return {centre.transpose() + axes.col(0) * c[0], axes * normal, c[3] / (reach * reach)};
+}
+
+std::vector<Item> items_of(const Points& points) {
+  std::vector<Item> items;
+  for (int i = 0; i < points.rows(); ++i) {
+    items.emplace_back(Kernel::Point_3(points(i, 0), points(i, 1), points(i, 2)), i);
+  }
+  return items;
+}
+
+}  // namespace
+
+struct PointCloud::Tree {
+  explicit Tree(const Points& all) : points(all) {
+    const auto items = items_of(all);
+    tree.insert(items.begin(), items.end());
+    tree.build();
+  }
+
+  // Squared distance and row of the nearest points, nearest first; of equally near ones the lower row first.
+  std::vector<std::pair<double, int>> nearest(const Eigen::Vector3d& query, int count) const {
+    Search search(tree, Kernel::Point_3(query.x(), query.y(), query.z()), count);
+    std::vector<std::pair<double, int>> found;
+    for (const auto& [item, squared] : search) found.emplace_back(squared, item.second);
+    std::sort(found.begin(), found.end());
+    return found;
+  }
+
+  const Points points;
+  Search::Tree tree;
+};
+
+PointCloud::PointCloud(const Points& points)
+    : tree_(std::make_unique<Tree>(points)),
+      foot_(points.rows(), 3),
+      normal_(points.rows(), 3),
+      curvature_(points.rows()),
+      spacing_mm_(points.rows()) {
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    const auto near = tree_->nearest(points.row(i), neighbours + 1);
+    Points around(near.size(), 3);
+    double sum = 0;
+    for (std::size_t k = 0; k < near.size(); ++k) {
+      around.row(k) = points.row(near[k].second);
+      if (k >= 1 && k <= spacing_neighbours) sum += std::sqrt(near[k].first);
+    }
+    spacing_mm_[i] = sum / spacing_neighbours;
+    const Fit fit = fit_surface(around);
+    foot_.row(i) = fit.foot;
+    normal_.row(i) = fit.normal;
+    curvature_[i] = fit.curvature;
+  }
+}
+
+PointCloud::~PointCloud() = default;
+PointCloud::PointCloud(PointCloud&&) noexcept = default;
+PointCloud& PointCloud::operator=(PointCloud&&) noexcept = default;
+
+PointCloud::Hit PointCloud::closest(const Eigen::Vector3d& query) const {
+  const int point = tree_->nearest(query, 1).front().second;
+  const Eigen::Vector3d normal = normal_.row(point);
+  const Eigen::Vector3d nearest = tree_->points.row(point);
+  const Eigen::Vector3d offset = query - nearest;
+  const double along_mm = (offset - normal * normal.dot(offset)).norm();
+  if (along_mm > reach_spacings * spacing_mm_[point]) return {point, nearest, true};
+  // Sphere of curvature k through the foot f: n·w − k/2 |w|² = 0, w from f. Written so that k = 0 is the plane.
+  const double k = curvature_[point];
+  const Eigen::Vector3d w = query - foot_.row(point).transpose();
+  const double level = normal.dot(w) - k / 2 * w.squaredNorm();
+  const double root = std::sqrt(std::max(0.0, 1 - 2 * k * level));  // |n − k w|: 0 only at the centre of the sphere
+  if (root < least_root) return {point, nearest, false};
+  const double height = 2 * level / (1 + root);
+  return {point, query - height / root * (normal - k * w), false};
+}
+
+}  // namespace supine::calibration

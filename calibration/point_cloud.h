@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "common/arrays.h"
+
+namespace supine::calibration {
+
+/// Nearest points of a bare point cloud, and the sphere or plane that the surface resembles around each of them.
+///
+/// Around each point a paraboloid of revolution h = c0 + c1 u + c2 v + k/2 (u² + v²) is fitted to its 18 neighbours
+/// over their plane (least squares); distances are those to the osculating sphere. This averages the noise of single
+/// points, and unlike the plane alone it is not drawn inward where the surface is curved.
+class PointCloud {
+ public:
+  /// A surface is taken to go on this many local spacings beyond its last points.
+  static constexpr double reach_spacings = 2;
+
+  static constexpr int neighbours = 18;  ///< about two and a half spacings around
+
+  /// @pre  more points than neighbours
+  explicit PointCloud(const Points& points);
+  ~PointCloud();
+  PointCloud(PointCloud&&) noexcept;
+  PointCloud& operator=(PointCloud&&) noexcept;
+
+  /// What lies closest to a query point.
+  struct Hit {
+    int point;                ///< nearest point
+    Eigen::Vector3d closest;  ///< on the local sphere; the nearest point itself beyond the border
+    bool beyond_border;       ///< the nearest point is further off than reach_spacings along the plane
+  };
+  Hit closest(const Eigen::Vector3d& query) const;
+
+  /// #P by 3, unit normals of the local fits; which way they point is not determined.
+  const Points& normals() const { return normal_; }
+  /// #P; mean distance to the six nearest neighbours, mm.
+  const Eigen::VectorXd& spacing_mm() const { return spacing_mm_; }
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+  Points foot_;  // where the fit crosses the normal through the neighbours' centre
+  Points normal_;
+  Eigen::VectorXd curvature_;  // 1/mm; > 0: hollow on the normal's side
+  Eigen::VectorXd spacing_mm_;
+};
+
+}  // namespace supine::calibration

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <utility>
+
+#include "meshing/tet_mesh.h"
+
+namespace supine::meshing {
+
+/// Smallest and largest dihedral angle of a corner tetrahedron, degrees. Row per corner.
+/// An inverted or flat tetrahedron gives {0, 180}.
+std::pair<double, double> dihedral_range_deg(const Eigen::Matrix<double, 4, 3>& corners);
+
+/// 3 × inradius / circumradius: 1 for the regular tetrahedron, 0 for a flat one, negative for an inverted one.
+double radius_ratio(const Eigen::Matrix<double, 4, 3>& corners);
+
+/// The health of a mesh, in numbers.
+struct QualityReport {
+  Eigen::Index nodes = 0, cells = 0, faces = 0;
+  Eigen::Index inverted = 0;  ///< cells without positive volume
+  double min_dihedral_deg = 180, max_dihedral_deg = 0;
+  std::array<Eigen::Index, 18> smallest_dihedral{};  ///< cells whose smallest angle lies in [10 i, 10 i + 10) degrees
+  std::array<Eigen::Index, 18> largest_dihedral{};   ///< the same of the largest
+  double min_radius_ratio = 1, mean_radius_ratio = 0;
+  int worst_cell = -1;  ///< the one with the smallest radius ratio
+  Eigen::Vector3d worst_place_mm = Eigen::Vector3d::Zero();
+  double volume_ml = 0;
+  Eigen::VectorXd tissue_ml;         ///< by segmentation::Tissue, from the fractions
+  std::array<double, 5> area_cm2{};  ///< by reconstruction::Region
+  std::array<Eigen::Index, 5> region_faces{};
+};
+
+/// Geometry of the corner tetrahedra; mesh.fraction may be empty.
+QualityReport measure_quality(const TetMesh& mesh);
+
+}  // namespace supine::meshing

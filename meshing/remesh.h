@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "reconstruction/surface.h"
+
+namespace supine::meshing {
+
+/// Where a surface must be finer than elsewhere.
+struct FinePlace {
+  Eigen::Vector3d point_mm;
+  int level;  ///< >= 1; edges are edge_mm / 2^level there
+};
+
+/// Isotropic remeshing with region borders kept, each level of fineness remeshed in its turn, finest first.
+/// @param surface  closed manifold, with regions (or none, then it is one region)
+/// @param edge_mm  edge length away from the fine places, > 0
+/// @return triangles of @p surface's regions; the topology is that of @p surface
+reconstruction::Surface remesh(const reconstruction::Surface& surface, double edge_mm,
+                               const std::vector<FinePlace>& fine);
+
+}  // namespace supine::meshing

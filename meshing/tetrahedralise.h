@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "meshing/tet_mesh.h"
+#include "reconstruction/surface.h"
+
+namespace supine::meshing {
+
+struct TetrahedraliseOptions {
+  std::size_t cells = 0;         ///< about so many tetrahedra; 0 = as the surface's triangles suggest
+  double radius_edge = 1.35;     ///< circumradius over shortest edge of a tetrahedron aimed at, in [1.2, 3]
+  double min_dihedral_deg = 14;  ///< aimed at, in [0, 18]
+  void check() const;            ///< @throws InputError naming option, value and bound
+};
+
+/// Fills a closed surface with tetrahedra (TetGen). The surface's triangles stay exactly as they are and become the
+/// mesh's faces, each with its region; inner closed pieces of surface are cavities and stay empty.
+/// @param surface  closed, manifold, outward, with regions inner, skin, cut (ligament) on every triangle
+/// @param what     names the surface in messages, for example its file
+/// @return linear mesh; tissue and fraction are not filled in (assign_tissue does), muscle is empty
+/// @throws InputError        not closed, not manifold, self-intersecting, inside out: kind, count and first place in mm
+/// @throws NumericalFailure  TetGen gave up; what it said
+TetMesh tetrahedralise(const reconstruction::Surface& surface, const TetrahedraliseOptions& options,
+                       const std::string& what = "the surface");
+
+/// Edge length of the tetrahedra that fit a surface: its triangles' mean edge, mm.
+double mean_edge_mm(const reconstruction::Surface& surface);
+
+}  // namespace supine::meshing

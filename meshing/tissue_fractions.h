@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "meshing/tet_mesh.h"
+#include "segmentation/image.h"
+
+namespace supine::meshing {
+
+/// How the mesh and the labels fit.
+struct FractionReport {
+  Eigen::VectorXd voxel_ml;  ///< by segmentation::Tissue; meshed tissues only, the others 0
+  double outside_share = 0;  ///< of the mesh's volume: further than the search radius from any meshed tissue
+};
+
+/// Fills mesh.fraction and mesh.tissue: the label of the voxel around each of 84 evenly spread points of every
+/// tetrahedron. Points on air, muscle or excluded voxels (the surface runs through the voxels' staircase) count for the
+/// nearest meshed tissue within 3 voxels, or else not at all; a tetrahedron without any such point takes the meshed
+/// voxel nearest to its centre within 10 voxels, or else is adipose.
+/// @throws InputError  more than 5 % of the mesh's volume is nowhere near meshed tissue: the labels are another case's,
+/// or in
+///   another frame
+FractionReport assign_tissue(TetMesh& mesh, const segmentation::LabelImage& labels);
+
+}  // namespace supine::meshing

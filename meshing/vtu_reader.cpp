@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "meshing/vtu_reader.h"
+
+#include <fmt/format.h>
+#include <vtkCellData.h>
+#include <vtkCellType.h>
+#include <vtkCommand.h>
+#include <vtkDataArray.h>
+#include <vtkFieldData.h>
+#include <vtkIdList.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkSmartPointer.h>
+#include <vtkStringArray.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkXMLUnstructuredGridReader.h>
+
+#include <map>
+#include <vector>
+
+#include "common/error.h"
+#include "meshing/mesh_check.h"
+#include "meshing/topology.h"
+#include "segmentation/tissue.h"
+
+namespace supine::meshing {
+namespace {
+
+// Keeps VTK's complaints off the terminal and remembers the first.
+class FirstError : public vtkCommand {
+ public:
+  static FirstError* New() { return new FirstError; }
+  void Execute(vtkObject*, unsigned long, void* message) override {
+    if (text.empty() && message != nullptr) text = static_cast<const char*>(message);
+    failed = true;
+  }
+  std::string text;
+  bool failed = false;
+};
+
+Table to_table(vtkDataArray& array) {
+  Table table(array.GetNumberOfTuples(), array.GetNumberOfComponents());
+  for (Eigen::Index r = 0; r < table.rows(); ++r) {
+    for (int k = 0; k < table.cols(); ++k) table(r, k) = array.GetComponent(r, k);
+  }
+  return table;
+}
+
+}  // namespace
+
+struct VtuReader::Grid {
+  vtkSmartPointer<vtkUnstructuredGrid> vtk;
+};
+
+VtuReader::VtuReader(const std::filesystem::path& file) : file_(file), grid_(std::make_unique<Grid>()) {
+  if (!std::filesystem::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
+  vtkNew<vtkXMLUnstructuredGridReader> reader;
+  vtkNew<FirstError> errors;
+  vtkNew<FirstError> parse_errors;
+  reader->AddObserver(vtkCommand::ErrorEvent, errors);
+  reader->SetParserErrorObserver(parse_errors);
+  reader->SetReaderErrorObserver(errors);
+  reader->SetFileName(file.c_str());
+  reader->Update();
+  if (errors->failed || parse_errors->failed || reader->GetErrorCode() != 0) {
+    throw InputError(fmt::format("{}: is not a readable .vtu file (cut off while it was written?)", file.string()));
+  }
+  grid_->vtk = reader->GetOutput();
+  if (text("frame").value_or("LPS") != "LPS") {
+    throw InputError(fmt::format("{}: frame is \"{}\"; meshes are LPS", file.string(), *text("frame")));
+  }
+  if (text("unit").value_or("mm") != "mm") {
+    throw InputError(fmt::format("{}: unit is \"{}\"; meshes are in mm", file.string(), *text("unit")));
+  }
+}
+
+VtuReader::~VtuReader() = default;
+
+std::optional<std::string> VtuReader::text(const std::string& field) const {
+  const auto* array = vtkStringArray::SafeDownCast(grid_->vtk->GetFieldData()->GetAbstractArray(field.c_str()));
+  if (array == nullptr || array->GetNumberOfValues() == 0) return std::nullopt;
+  return const_cast<vtkStringArray*>(array)->GetValue(0);
+}
+
+Points VtuReader::positions() const {
+  Points points(grid_->vtk->GetNumberOfPoints(), 3);
+  for (Eigen::Index i = 0; i < points.rows(); ++i) grid_->vtk->GetPoint(i, points.row(i).data());
+  return points;
+}
+
+Table VtuReader::point_array(const std::string& name, int components) const {
+  vtkDataArray* array = grid_->vtk->GetPointData()->GetArray(name.c_str());
+  if (array == nullptr) throw InputError(fmt::format("{}: has no point array \"{}\"", file_.string(), name));
+  if (array->GetNumberOfComponents() != components) {
+    throw InputError(fmt::format("{}: point array \"{}\" has {} components, {} are expected", file_.string(), name,
+                                 array->GetNumberOfComponents(), components));
+  }
+  return to_table(*array);
+}
+
+NamedTables VtuReader::point_arrays() const {
+  NamedTables tables;
+  vtkPointData* data = grid_->vtk->GetPointData();
+  for (int i = 0; i < data->GetNumberOfArrays(); ++i) {
+    if (vtkDataArray* array = data->GetArray(i)) tables.emplace_back(array->GetName(), to_table(*array));
+  }
+  return tables;
+}
+
+Table VtuReader::cell_column(const std::string& name) const {
+  vtkDataArray* array = grid_->vtk->GetCellData()->GetArray(name.c_str());
+  if (array == nullptr) throw InputError(fmt::format("{}: has no cell array \"{}\"", file_.string(), name));
+  return to_table(*array);
+}
+
+void VtuReader::read_topology(TetMesh& mesh) const {
+  vtkUnstructuredGrid& grid = *grid_->vtk;
+  const vtkIdType count = grid.GetNumberOfCells();
+  vtkIdType cells = 0;
+  while (cells < count && (grid.GetCellType(cells) == VTK_TETRA || grid.GetCellType(cells) == VTK_QUADRATIC_TETRA))
+    ++cells;
+  if (cells == 0)
+    throw InputError(fmt::format("{}: has no tetrahedra (they must come before the triangles)", file_.string()));
+  const bool quadratic = grid.GetCellType(0) == VTK_QUADRATIC_TETRA;
+  mesh.cells.resize(cells, quadratic ? 10 : 4);
+  mesh.faces.resize(count - cells, quadratic ? 6 : 3);
+  vtkNew<vtkIdList> nodes;
+  for (vtkIdType c = 0; c < count; ++c) {
+    const bool is_tet = c < cells;
+    const int wanted =
+        is_tet ? (quadratic ? VTK_QUADRATIC_TETRA : VTK_TETRA) : (quadratic ? VTK_QUADRATIC_TRIANGLE : VTK_TRIANGLE);
+    if (grid.GetCellType(c) != wanted) {
+      throw InputError(
+          fmt::format("{}: cell {} is of VTK type {}; {} was expected (tetrahedra, then triangles, of one order)",
+                      file_.string(), c, grid.GetCellType(c), wanted));
+    }
+    grid.GetCellPoints(c, nodes);
+    for (vtkIdType k = 0; k < nodes->GetNumberOfIds(); ++k) {
+      (is_tet ? mesh.cells(c, k) : mesh.faces(c - cells, k)) = static_cast<int>(nodes->GetId(k));
+    }
+  }
+  std::map<std::array<int, 3>, int> owner;
+  const Boundary boundary = boundary_of(mesh.cells);
+  const auto key = [](const Indices& faces, Eigen::Index f) {
+    std::array<int, 3> corners = {faces(f, 0), faces(f, 1), faces(f, 2)};
+    std::sort(corners.begin(), corners.end());
+    return corners;
+  };
+  for (Eigen::Index f = 0; f < boundary.faces.rows(); ++f) owner[key(boundary.faces, f)] = boundary.face_cell[f];
+  mesh.face_cell = Eigen::VectorXi::Constant(mesh.faces.rows(), -1);
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
+    const auto found = owner.find(key(mesh.faces, f));
+    if (found != owner.end()) mesh.face_cell[f] = found->second;
+  }
+}
+
+void VtuReader::read_tissue(TetMesh& mesh) const {
+  const Eigen::Index cells = mesh.cells.rows();
+  mesh.tissue = cell_column("tissue").col(0).head(cells).cast<int>();
+  mesh.region = cell_column("region").col(0).tail(mesh.faces.rows()).cast<int>();
+  mesh.fraction = Table::Zero(cells, segmentation::tissue_count);
+  for (int t = 0; t < segmentation::tissue_count; ++t) {
+    if (!segmentation::is_meshed(static_cast<segmentation::Tissue>(t))) continue;
+    mesh.fraction.col(t) = cell_column(fmt::format("fraction_{}", segmentation::tissue_names[t])).col(0).head(cells);
+  }
+}
+
+void VtuReader::read_muscle(TetMesh& mesh) const {
+  vtkDataArray* points = grid_->vtk->GetFieldData()->GetArray("muscle_points_mm");
+  vtkDataArray* triangles = grid_->vtk->GetFieldData()->GetArray("muscle_triangles");
+  if (points == nullptr || triangles == nullptr || points->GetNumberOfComponents() != 3 ||
+      triangles->GetNumberOfComponents() != 3) {
+    throw InputError(
+        fmt::format("{}: has no muscle sheet (field data muscle_points_mm and muscle_triangles, three components each)",
+                    file_.string()));
+  }
+  mesh.muscle.points = to_table(*points);
+  mesh.muscle.triangles = to_table(*triangles).cast<int>();
+  const auto& rows = mesh.muscle.triangles;
+  if (rows.size() > 0 && (rows.minCoeff() < 0 || rows.maxCoeff() >= mesh.muscle.points.rows())) {
+    throw InputError(
+        fmt::format("{}: muscle_triangles names a point that muscle_points_mm does not have", file_.string()));
+  }
+}
+
+TetMesh VtuReader::mesh(const Table& displacement) const {
+  TetMesh mesh;
+  mesh.points = positions();
+  if (displacement.size() > 0) mesh.points -= displacement;
+  read_topology(mesh);
+  read_tissue(mesh);
+  read_muscle(mesh);
+  try {
+    check_mesh(mesh);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", file_.string(), error.what()));
+  }
+  return mesh;
+}
+
+}  // namespace supine::meshing

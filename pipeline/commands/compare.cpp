@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "calibration/compare.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+
+#include "calibration/comparison_files.h"
+#include "common/error.h"
+#include "meshing/anatomy.h"
+#include "meshing/mesh_io.h"
+#include "pipeline/case.h"
+#include "pipeline/tool.h"
+#include "reconstruction/surface_io.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using calibration::Comparison;
+using Json = nlohmann::ordered_json;
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+std::string text(double value) { return std::isfinite(value) ? fmt::format("{:.2f}", value) : "-"; }
+
+struct Inputs {
+  Case measured;
+  Pose pose;
+  meshing::PoseMesh predicted;
+  reconstruction::Surface surface;
+};
+
+class CompareTool : public Tool {
+ public:
+  std::string name() const override { return "supine-compare"; }
+
+  std::string summary() const override {
+    return "Compares the shape of a pose with the surface that was measured in it, in both directions, with signs: "
+           "distance_mm > 0 where the scan lies outside the model.\n"
+           "Writes comparison.vtp (the model's skin), scan.vtp and comparison.json; for a pose other than supine "
+           "comparison_POSE.vtp and scan_POSE.vtp. -o names their folder (default: that of the pose file).\n\n"
+           "Examples:\n"
+           "  supine-compare mycase mycase/out/supine.vtu\n"
+           "  supine-compare mycase mycase/out/tilt45.vtu -o mycase/out --force\n";
+  }
+
+  void declare(CLI::App& app) override {
+    app.add_option("case", case_folder_, "case folder, holds case.toml")->required();
+    app.add_option("pose_file", pose_file_, "shape of the model in the pose, as supine-simulate writes it (.vtu)")
+        ->required();
+    app.add_option("--pose", pose_name_, "which measurement of the case (default: the name of the pose file)");
+  }
+
+  Outcome run(Run& run) override {
+    run.stage("read");
+    const Inputs inputs = read(run);
+    const std::string scan_name = inputs.pose.surface->string();
+    run.stage("anatomy");
+    const calibration::SkinAreas areas = find_areas(inputs, run);
+    run.stage("compare");
+    const calibration::ModelSkin model(inputs.predicted.mesh, inputs.predicted.positions);
+    const calibration::Scan scan(inputs.surface, model, scan_name);
+    calibration::check_placement(scan, model, inputs.predicted.mesh.muscle, scan_name);
+    const Comparison comparison = calibration::compare(model, scan, areas);
+    const auto landmarks = compare_landmarks(inputs, run);
+    run.stage("write");
+    const fs::path skin_file = target(inputs.pose, "comparison"), scan_file = target(inputs.pose, "scan");
+    calibration::write_comparison(comparison, model, areas, run.output(skin_file));
+    calibration::write_scan(comparison, scan, run.output(scan_file));
+    fill(run.figures(skin_file), inputs.pose, comparison, landmarks);
+    run.figures(scan_file) = {{"pose", inputs.pose.name},
+                              {"scan_points", comparison.used.size()},
+                              {"scan_points_used", comparison.scan_points_used},
+                              {"scan_triangles", scan.distance().triangles().rows()}};
+    say(run, inputs.pose, comparison, landmarks);
+    return Outcome::done;
+  }
+
+ private:
+  Inputs read(Run& run) const {
+    run.input(case_folder_ / "case.toml");
+    Inputs inputs{read_case(case_folder_), {}, {}, {}};
+    inputs.pose = inputs.measured.pose(pose_name_.empty() ? pose_file_.stem().string() : pose_name_);
+    if (!inputs.pose.surface) {
+      throw InputError(
+          fmt::format("{}: pose '{}' has no surface; nothing to compare with. Name the measured surface as `surface` "
+                      "in [pose.{}]",
+                      (case_folder_ / "case.toml").string(), inputs.pose.name, inputs.pose.name));
+    }
+    inputs.predicted = meshing::read_pose(run.input(pose_file_));
+    inputs.surface = reconstruction::read_surface(run.input(*inputs.pose.surface), inputs.measured.frame);
+    return inputs;
+  }
+
+  calibration::SkinAreas find_areas(const Inputs& inputs, Run& run) const {
+    if (inputs.measured.side == "both") {
+      run.warn("no area table: the areas are those of one breast and the case has side = \"both\"");
+      return {};
+    }
+    const auto anatomy = meshing::compute_anatomy(inputs.predicted.mesh, inputs.measured.side);
+    return calibration::anatomical_areas(inputs.predicted.mesh, anatomy);
+  }
+
+  std::vector<calibration::LandmarkError> compare_landmarks(const Inputs& inputs, Run& run) const {
+    if (!inputs.pose.landmarks) return {};
+    const fs::path predicted = pose_file_.parent_path() / (pose_file_.stem().string() + "_landmarks.csv");
+    if (!fs::exists(predicted)) {
+      run.warn(fmt::format("no landmark table: {} is not there (supine-simulate writes it beside the pose)",
+                           predicted.string()));
+      return {};
+    }
+    const Landmarks measured = read_landmarks(run.input(*inputs.pose.landmarks), inputs.measured.frame);
+    try {
+      return calibration::compare_landmarks(read_landmarks(run.input(predicted)), measured);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", inputs.pose.landmarks->string(), error.what()));
+    }
+  }
+
+  fs::path target(const Pose& pose, const std::string& stem) const {
+    const fs::path folder = output.empty() ? pose_file_.parent_path() : output;
+    return folder / (pose.name == "supine" ? stem + ".vtp" : stem + "_" + pose.name + ".vtp");
+  }
+
+  static void fill(Json& figures, const Pose& pose, const Comparison& comparison,
+                   const std::vector<calibration::LandmarkError>& landmarks) {
+    figures["pose"] = pose.name;
+    figures["mae_study_mm"] = number_or_null(comparison.mae_study_mm);
+    figures["mae_mm"] = comparison.scan.mae_mm;
+    figures["rms_mm"] = comparison.scan.rms_mm;
+    figures["median_mm"] = comparison.scan.median_mm;
+    figures["p95_mm"] = comparison.scan.p95_mm;
+    figures["hausdorff_mm"] = comparison.scan.hausdorff_mm;
+    figures["mean_signed_mm"] = comparison.scan.mean_signed_mm;
+    figures["covered_fraction"] = comparison.covered_fraction;
+    figures["noise_mm"] = pose.noise_mm ? Json(*pose.noise_mm) : Json(nullptr);
+    figures["model_points"] = comparison.model_to_scan.covered.size();
+    figures["scan_points"] = comparison.used.size();
+    figures["scan_points_used"] = comparison.scan_points_used;
+    figures["areas"] = Json::array();
+    for (const auto& area : comparison.areas) {
+      figures["areas"].push_back({{"name", area.name},
+                                  {"area_cm2", area.area_cm2},
+                                  {"mae_mm", number_or_null(area.mae_mm)},
+                                  {"mean_signed_mm", number_or_null(area.mean_signed_mm)},
+                                  {"scan_points", area.scan_points}});
+    }
+    figures["landmarks"] = Json::array();
+    for (const auto& landmark : landmarks) {
+      figures["landmarks"].push_back({{"name", landmark.name}, {"error_mm", landmark.error_mm}});
+    }
+  }
+
+  static void say(const Run& run, const Pose& pose, const Comparison& comparison,
+                  const std::vector<calibration::LandmarkError>& landmarks) {
+    const auto row = [&run](const char* what, double value) {
+      run.say(fmt::format("  {:<34}{:>8}", what, text(value)));
+    };
+    run.say(fmt::format("{}: model against {}", pose.name, pose.surface->filename().string()));
+    run.say(fmt::format("  {:<34}{:>8}", "", "mm"));
+    row("MAE, model to scan (study)", comparison.mae_study_mm);
+    row("MAE, scan to model", comparison.scan.mae_mm);
+    row("RMS", comparison.scan.rms_mm);
+    row("median", comparison.scan.median_mm);
+    row("95th percentile", comparison.scan.p95_mm);
+    row("maximum", comparison.scan.hausdorff_mm);
+    row("signed mean (> 0: scan outside)", comparison.scan.mean_signed_mm);
+    if (pose.noise_mm) row("scanner noise, 1 sigma", *pose.noise_mm);
+    run.say(fmt::format("  {:.0f} % of the skin covered; {} of {} scan points used", 100 * comparison.covered_fraction,
+                        comparison.scan_points_used, comparison.used.size()));
+    say_areas(run, comparison);
+    if (!landmarks.empty()) run.say(fmt::format("  {:<34}{:>8}", "landmark", "mm"));
+    for (const auto& landmark : landmarks) row(landmark.name.c_str(), landmark.error_mm);
+  }
+
+  static void say_areas(const Run& run, const Comparison& comparison) {
+    if (comparison.areas.empty()) return;
+    run.say(fmt::format("  {:<18}{:>8}{:>8}{:>8}", "area", "cm2", "MAE", "signed"));
+    for (const auto& area : comparison.areas) {
+      run.say(fmt::format("  {:<18}{:>8.1f}{:>8}{:>8}", area.name, area.area_cm2, text(area.mae_mm),
+                          text(area.mean_signed_mm)));
+    }
+  }
+
+  fs::path case_folder_, pose_file_;
+  std::string pose_name_;
+};
+
+}  // namespace
+}  // namespace supine::pipeline
+
+int main(int argc, char** argv) {
+  supine::pipeline::CompareTool tool;
+  return supine::pipeline::tool_main(tool, argc, argv);
+}

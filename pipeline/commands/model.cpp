@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <fmt/core.h>
+
+#include <fstream>
+
+#include "common/error.h"
+#include "common/outputs.h"
+#include "pipeline/model_edit.h"
+#include "pipeline/model_file.h"
+#include "pipeline/tool.h"
+#include "simulation/catalogue.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using simulation::Parameter;
+using simulation::Setting;
+
+std::string setting_text(const Setting& setting) {
+  if (!setting.free) return fmt::format("{}", setting.value);
+  const std::string spread = setting.prior_sd ? fmt::format(" +- {}", *setting.prior_sd) : "";
+  return fmt::format("{}{}  free in [{}, {}]", setting.value, spread, setting.lower, setting.upper);
+}
+
+class ModelTool : public Tool {
+ public:
+  std::string name() const override { return "supine-model"; }
+
+  std::string summary() const override {
+    return "Adds effects to a model file and removes them; shows what the file says and which effects there are.\n"
+           "add and remove change model.toml itself, comments kept, unless -o names another file.\n\n"
+           "Examples:\n"
+           "  supine-model list\n"
+           "  supine-model show mycase/model.toml\n"
+           "  supine-model add ligament mycase/model.toml\n"
+           "  supine-model remove ligament mycase/model.toml\n";
+  }
+
+  void declare(CLI::App& app) override {
+    app.add_option("action", action_, "list, show, add or remove")
+        ->required()
+        ->check(CLI::IsMember({"list", "show", "add", "remove"}));
+    app.add_option("arguments", arguments_, "show: model.toml; add, remove: EFFECT model.toml")->expected(0, 2);
+  }
+
+  Outcome run(Run& run) override {
+    const std::size_t wanted = action_ == "list" ? 0 : action_ == "show" ? 1 : 2;
+    if (arguments_.size() != wanted)
+      throw InputError(fmt::format("{} takes {}", action_,
+                                   wanted == 0   ? "no further argument"
+                                   : wanted == 1 ? "a model file"
+                                                 : "an effect and a model file"));
+    if (action_ == "list")
+      list(run);
+    else if (action_ == "show")
+      show(run);
+    else
+      edit(run);
+    return Outcome::done;
+  }
+
+ private:
+  static void list_row(const Run& run, const Parameter& row) {
+    run.say(fmt::format("    {:<36}{:<9}null {:<6} range {:>8} to {:<8} {}", row.name, row.unit == "1" ? "" : row.unit,
+                        row.null, row.lower, row.upper, row.meaning));
+  }
+
+  static void list(const Run& run) {
+    run.say("Base model");
+    for (const Parameter& row : simulation::base_parameters())
+      run.say(fmt::format("    {:<36}{:<9}range {:>8} to {:<8} {}", row.name, row.unit == "1" ? "" : row.unit,
+                          row.lower, row.upper, row.meaning));
+    run.say("Effects (at null an effect leaves the model unchanged)");
+    for (const simulation::Effect* effect : simulation::catalogue()) {
+      run.say(fmt::format("  {}: {}", effect->name(), effect->meaning()));
+      for (const Parameter& row : effect->parameters()) list_row(run, row);
+      for (const auto& option : effect->options()) {
+        std::string values;
+        for (const std::string& value : option.values) values += (values.empty() ? "" : ", ") + value;
+        run.say(fmt::format("    {:<36}{} (default {}) {}", option.name, values, option.default_value, option.meaning));
+      }
+    }
+  }
+
+  void show(Run& run) const {
+    const simulation::Model model = read_model(run.input(arguments_[0]));
+    const auto say = [&run](const char* key, const Setting& setting) {
+      run.say(fmt::format("  {:<36}{}", key, setting_text(setting)));
+    };
+    say("breast.young_modulus_kpa", model.breast.young_modulus_kpa);
+    say("breast.poisson_ratio", model.breast.poisson_ratio);
+    say("breast.density_kg_m3", model.breast.density_kg_m3);
+    say("skin.young_modulus_kpa", model.skin.young_modulus_kpa);
+    say("skin.thickness_mm", model.skin.thickness_mm);
+    say("skin.compression_share", model.skin.compression_share);
+    if (model.skin.poisson_ratio) say("skin.poisson_ratio", *model.skin.poisson_ratio);
+    say("interface.normal_kpa_per_mm", model.interface.normal_kpa_per_mm);
+    say("interface.tangential_kpa_per_mm", model.interface.tangential_kpa_per_mm);
+    say("cut.stiffness_kpa_per_mm", model.cut.stiffness_kpa_per_mm);
+    for (const auto& effect : model.effects) {
+      run.say("effect " + effect.name);
+      for (const auto& [key, setting] : effect.parameters) say(key.c_str(), setting);
+      for (const auto& [key, value] : effect.options) run.say(fmt::format("  {:<36}{}", key, value));
+    }
+  }
+
+  void edit(Run& run) {
+    const std::string& effect = arguments_[0];
+    const fs::path file = arguments_[1];
+    const fs::path target = output.empty() ? file : output;
+    const std::string text = action_ == "add" ? with_effect(file, effect) : without_effect(file, effect);
+    // Changing the named file is what was asked for, so only another target needs --force.
+    Outputs outputs(output.empty() || run.force());
+    const fs::path temporary = outputs.stage(target);
+    std::ofstream(temporary, std::ios::binary) << text;
+    read_model(temporary);
+    outputs.commit();
+    run.say(fmt::format("{} {} {}", target.string(), action_ == "add" ? "now has" : "no longer has", effect));
+  }
+
+  std::string action_;
+  std::vector<std::string> arguments_;
+};
+
+}  // namespace
+}  // namespace supine::pipeline
+
+int main(int argc, char** argv) {
+  supine::pipeline::ModelTool tool;
+  return supine::pipeline::tool_main(tool, argc, argv);
+}

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "common/error.h"
+#include "common/landmarks.h"
+#include "meshing/mesh_io.h"
+#include "pipeline/case.h"
+#include "pipeline/model_file.h"
+#include "pipeline/tool.h"
+#include "reconstruction/surface_io.h"
+#include "simulation/chain.h"
+#include "simulation/embedding.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using simulation::ChainSolution;
+using simulation::InverseMethod;
+using simulation::PoseSolution;
+
+const std::map<std::string, InverseMethod> inverse_methods = {{"newton", InverseMethod::newton},
+                                                              {"fixed-point", InverseMethod::fixed_point},
+                                                              {"reversed-gravity", InverseMethod::reversed_gravity}};
+
+// A round trip beyond this is not a certificate; the true inverse ends orders below.
+constexpr double round_trip_bound_mm = 1e-6;
+
+double rms(const Eigen::VectorXd& lengths) {
+  return std::sqrt(lengths.squaredNorm() / static_cast<double>(lengths.size()));
+}
+
+/// Surfaces and landmarks that move along with the tissue.
+struct Passenger {
+  std::string name;  // "gland", "tumour", …
+  reconstruction::Surface surface;
+  simulation::Embedding embedding;
+};
+
+struct Inputs {
+  Case measured;
+  simulation::Model model;
+  meshing::TetMesh mesh;
+  meshing::Anatomy anatomy;
+  std::vector<simulation::PoseLoad> loads;
+};
+
+class SimulateTool : public Tool {
+ public:
+  std::string name() const override { return "supine-simulate"; }
+
+  std::string summary() const override {
+    return "Finds the gravity-free (undeformed) shape of the prone breast and from it the shape in every other pose of "
+           "the case.\n"
+           "Writes prone.vtu, undeformed.vtu, supine.vtu (and the case's other poses), the organ surfaces and "
+           "landmarks "
+           "in each pose. -o names their folder (default: that of the mesh).\n\n"
+           "Examples:\n"
+           "  supine-simulate mycase mycase/out/mesh.vtu\n"
+           "  supine-simulate mycase mycase/out/mesh.vtu --model stiff.toml --pose supine -o trial\n";
+  }
+
+  void declare(CLI::App& app) override {
+    app.add_option("case", case_folder_, "case folder, holds case.toml")->required();
+    app.add_option("mesh", mesh_file_, "imaged mesh, as supine-tetrahedralise writes it (.vtu)")->required();
+    app.add_option("--model", model_file_, "what is believed of the tissue (default: CASE/model.toml)");
+    app.add_option("--pose", pose_names_, "predict this pose only; may be given several times (default: all)");
+    app.add_option("--inverse", inverse_,
+                   "how the undeformed shape is found: newton (true inverse), fixed-point, "
+                   "reversed-gravity")
+        ->check(CLI::IsMember({"newton", "fixed-point", "reversed-gravity"}))
+        ->capture_default_str();
+  }
+
+  Outcome run(Run& run) override {
+    run.stage("read");
+    const Inputs in = read(run);
+    run.stage("solve");
+    simulation::SolveOptions options;
+    options.progress = [&run](double load, int iteration, double share) {
+      run.progress(
+          fmt::format("load {:.2f}, iteration {}: {:.1e} of the weight out of balance", load, iteration, share));
+    };
+    const ChainSolution solution =
+        simulation::solve_chain(in.mesh, in.anatomy, in.model, in.loads, inverse_methods.at(inverse_), options);
+    run.stage("write");
+    write(run, in, solution);
+    say(run, in, solution);
+    if (inverse_ != "newton") return Outcome::done;
+    if (solution.round_trip_max_mm <= round_trip_bound_mm) return Outcome::done;
+    run.warn(
+        fmt::format("the round trip ends {:.2e} mm from the imaged shape (bound {:.0e} mm): loading the undeformed "
+                    "shape again finds another equilibrium, so the prediction is one of several",
+                    solution.round_trip_max_mm, round_trip_bound_mm));
+    return Outcome::target_not_met;
+  }
+
+ private:
+  Inputs read(Run& run) const {
+    run.input(case_folder_ / "case.toml");
+    Inputs in{read_case(case_folder_), {}, {}, {}, {}};
+    in.model = read_model(run.input(model_file_.empty() ? case_folder_ / "model.toml" : model_file_));
+    in.mesh = meshing::read_mesh(run.input(mesh_file_));
+    if (in.measured.side == "both")
+      throw InputError((case_folder_ / "case.toml").string() +
+                       ": case.side = \"both\" cannot be simulated yet: make one case per breast (left, right)");
+    in.anatomy = meshing::compute_anatomy(in.mesh, in.measured.side);
+    for (const std::string& wanted : pose_names_) in.measured.pose(wanted);
+    for (const Pose& pose : in.measured.poses)
+      if (pose.name == "prone" || pose_names_.empty() ||
+          std::find(pose_names_.begin(), pose_names_.end(), pose.name) != pose_names_.end())
+        in.loads.push_back({pose.name, pose.gravity});
+    return in;
+  }
+
+  fs::path folder() const { return output.empty() ? mesh_file_.parent_path() : output; }
+
+  std::vector<Passenger> passengers(Run& run, const Inputs& in) const {
+    std::vector<Passenger> found;
+    for (const auto name : segmentation::tissue_names) {
+      const fs::path file = mesh_file_.parent_path() / (std::string(name) + ".vtp");
+      if (name == "muscle" || !fs::exists(file)) continue;
+      auto surface = reconstruction::read_surface(run.input(file));
+      simulation::Embedding embedding(in.mesh, surface.points);
+      found.push_back({std::string(name), std::move(surface), std::move(embedding)});
+    }
+    return found;
+  }
+
+  void write(Run& run, const Inputs& in, const ChainSolution& solution) const {
+    const auto organs = passengers(run, in);
+    std::optional<Landmarks> landmarks;
+    std::optional<simulation::Embedding> landmark_places;
+    if (in.measured.prone_landmarks) {
+      landmarks = read_landmarks(run.input(*in.measured.prone_landmarks), in.measured.frame);
+      landmark_places.emplace(in.mesh, landmarks->points);
+    }
+    const auto write_shape = [&](const std::string& name, const Points& x, const meshing::NamedTables& extra) {
+      const fs::path file = folder() / (name + ".vtu");
+      const Eigen::VectorXd det_f = simulation::cell_det_f(in.mesh.cells, x, solution.X);
+      meshing::write_pose(in.mesh, x, extra, {{"det_f", det_f}}, run.output(file), in.measured.side);
+      for (const Passenger& organ : organs) {
+        reconstruction::Surface moved = organ.surface;
+        moved.points = organ.embedding.at(x);
+        reconstruction::write_surface(moved, run.output(folder() / (name + "_" + organ.name + ".vtp")));
+      }
+      if (landmarks)
+        write_landmarks({landmarks->names, landmark_places->at(x)}, run.output(folder() / (name + "_landmarks.csv")));
+      return file;
+    };
+    const Eigen::VectorXd error = (solution.round_trip.x - in.mesh.points).rowwise().norm();
+    const fs::path prone = write_shape("prone", in.mesh.points, {{"round_trip_error_mm", error}});
+    const fs::path undeformed = write_shape("undeformed", solution.X, {});
+    run.figures(prone) = figures(in, solution, solution.round_trip.report, in.mesh.points);
+    run.figures(undeformed) = figures(in, solution, solution.inverse, solution.X);
+    for (const PoseSolution& pose : solution.poses) {
+      const fs::path file = write_shape(pose.name, pose.x, {});
+      run.figures(file) = figures(in, solution, pose.report, pose.x);
+    }
+  }
+
+  Json figures(const Inputs& in, const ChainSolution& solution, const simulation::SolveReport& report,
+               const Points& x) const {
+    const Eigen::VectorXd from_prone = (x - in.mesh.points).rowwise().norm();
+    const Eigen::VectorXd from_undeformed = (x - solution.X).rowwise().norm();
+    Json f;
+    f["inverse"] = inverse_;
+    f["round_trip_max_mm"] = solution.round_trip_max_mm;
+    f["round_trip_rms_mm"] = solution.round_trip_rms_mm;
+    f["newton_iterations"] = report.newton_iterations;
+    f["load_steps"] = report.load_steps;
+    f["min_det_f"] = report.min_det_f;
+    f["residual_share"] = report.residual_share;
+    f["displacement_from_prone_mm"] = {{"rms", rms(from_prone)}, {"max", from_prone.maxCoeff()}};
+    f["displacement_from_undeformed_mm"] = {{"rms", rms(from_undeformed)}, {"max", from_undeformed.maxCoeff()}};
+    f["nipple_mm"] = {x(in.anatomy.nipple_point, 0), x(in.anatomy.nipple_point, 1), x(in.anatomy.nipple_point, 2)};
+    f["load_number"] = simulation::load_number(in.anatomy, in.model);
+    f["nodes"] = in.mesh.points.rows();
+    f["tetrahedra"] = in.mesh.cells.rows();
+    f["order"] = in.mesh.order();
+    f["muscle_fit_rms_mm"] = in.anatomy.muscle->fit_rms_mm();
+    f["blas"] = simulation::blas_description();
+    return f;
+  }
+
+  void say(Run& run, const Inputs& in, const ChainSolution& solution) const {
+    const auto row = [&](const std::string& what, const simulation::SolveReport& report, const Points& x) {
+      const Eigen::VectorXd moved = (x - in.mesh.points).rowwise().norm();
+      run.say(fmt::format("  {:<24}{:>8.2f}{:>8.2f}{:>8}{:>8}{:>10.3f}", what, rms(moved), moved.maxCoeff(),
+                          report.newton_iterations, report.load_steps, report.min_det_f));
+    };
+    run.say(fmt::format("{} nodes, {} tetrahedra of order {}; load number ρgH/E = {:.2f}", in.mesh.points.rows(),
+                        in.mesh.cells.rows(), in.mesh.order(), simulation::load_number(in.anatomy, in.model)));
+    run.say(fmt::format("  {:<24}{:>8}{:>8}{:>8}{:>8}{:>10}", "moved from prone, mm", "rms", "max", "Newton", "steps",
+                        "min det F"));
+    row("undeformed", solution.inverse, solution.X);
+    for (const PoseSolution& pose : solution.poses) row(pose.name, pose.report, pose.x);
+    run.say(fmt::format("  round trip undeformed → prone: {:.2e} mm at most (bound {:.0e}), {} Newton steps",
+                        solution.round_trip_max_mm, round_trip_bound_mm, solution.round_trip.report.newton_iterations));
+  }
+
+  fs::path case_folder_, mesh_file_, model_file_;
+  std::vector<std::string> pose_names_;
+  std::string inverse_ = "newton";
+};
+
+}  // namespace
+}  // namespace supine::pipeline
+
+int main(int argc, char** argv) {
+  supine::pipeline::SimulateTool tool;
+  return supine::pipeline::tool_main(tool, argc, argv);
+}

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "meshing/tetrahedralise.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+
+#include "common/error.h"
+#include "meshing/anatomy.h"
+#include "meshing/ligament_ring.h"
+#include "meshing/mesh_check.h"
+#include "meshing/mesh_io.h"
+#include "meshing/quality.h"
+#include "meshing/tissue_fractions.h"
+#include "meshing/topology.h"
+#include "pipeline/tool.h"
+#include "reconstruction/surface_io.h"
+#include "segmentation/labels_io.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using meshing::QualityReport;
+using meshing::TetMesh;
+using segmentation::tissue_names;
+
+constexpr double good_dihedral_deg = 5;    // below, stiffness matrices suffer
+constexpr double good_cells_share = 0.25;  // how far --cells may be missed
+
+/// Everything a run finds out besides the mesh itself.
+struct Findings {
+  QualityReport quality;
+  std::optional<meshing::FractionReport> fractions;
+  std::optional<meshing::Anatomy> anatomy;
+};
+
+Json numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+class TetrahedraliseTool : public Tool {
+ public:
+  std::string name() const override { return "supine-tetrahedralise"; }
+
+  std::string summary() const override {
+    return "Fills the decimated breast surface with tetrahedra that carry tissue fractions and boundary regions, and "
+           "prints their quality.\n"
+           "Writes mesh.vtu (default: beside the surface).\n\n"
+           "Examples:\n"
+           "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --side left\n"
+           "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --cells 20000 --order 2 -o fine.vtu\n"
+           "  supine-tetrahedralise --check mesh.vtu\n";
+  }
+
+  void declare(CLI::App& app) override {
+    app.add_option("surface", surface_, "closed surface with regions (.vtp); with --check also a mesh (.vtu)")
+        ->required();
+    app.add_option("muscle", muscle_, "breast-facing muscle sheet (.vtp)");
+    app.add_option("labels", labels_, "label volume (.vti)");
+    app.add_option("--order", order_, "1: linear, 2: quadratic tetrahedra with straight edges")
+        ->check(CLI::IsMember({1, 2}));
+    app.add_option("--cells", options_.cells, "about so many tetrahedra, 0 = as the surface's triangles suggest");
+    app.add_option("--radius-edge", options_.radius_edge, "circumradius over shortest edge aimed at, 1.2 to 3");
+    app.add_option("--min-dihedral", options_.min_dihedral_deg, "smallest dihedral angle aimed at, degrees, 0 to 18");
+    app.add_option("--side", side_, "which breast it is; lateral direction and ligament ring need it")
+        ->check(CLI::IsMember({"left", "right", "both"}));
+    app.add_flag("--check", check_, "print the report, write nothing; exit code 1 when the mesh is not good");
+  }
+
+  Outcome run(Run& run) override {
+    Findings findings;
+    if (check_ && fs::path(surface_).extension() == ".vtu") {
+      findings.quality = meshing::measure_quality(meshing::read_mesh(run.input(surface_)));
+      say(run, findings);
+      return judge(run, findings.quality);
+    }
+    const TetMesh mesh = make_mesh(run, findings);
+    say(run, findings);
+    if (!check_) write(run, mesh, findings);
+    return judge(run, findings.quality);
+  }
+
+ private:
+  TetMesh make_mesh(Run& run, Findings& findings) const {
+    if (muscle_.empty() || labels_.empty()) {
+      throw InputError("three files are needed: SURFACE.vtp MUSCLE.vtp LABELS.vti (or --check MESH.vtu)");
+    }
+    run.stage("read");
+    const reconstruction::Surface surface = reconstruction::read_surface(run.input(surface_));
+    const reconstruction::Surface muscle = reconstruction::read_surface(run.input(muscle_));
+    const segmentation::LabelImage labels = segmentation::read_labels(run.input(labels_));
+    run.stage("tetrahedra");
+    run.progress("filling the surface with tetrahedra");
+    TetMesh mesh = meshing::tetrahedralise(surface, options_, surface_);
+    mesh.muscle = muscle;
+    run.stage("tissue");
+    run.progress("reading tissue fractions from the labels");
+    findings.fractions = meshing::assign_tissue(mesh, labels);
+    run.stage("anatomy");
+    run.progress("finding the foot of the mound");
+    mark_ring(run, mesh, findings);
+    if (order_ == 2) mesh = meshing::to_quadratic(mesh);
+    run.stage("check");
+    meshing::check_mesh(mesh);
+    findings.quality = meshing::measure_quality(mesh);
+    return mesh;
+  }
+
+  void mark_ring(Run& run, TetMesh& mesh, Findings& findings) const {
+    if (side_ == "both") {
+      run.warn("--side both: no ligament ring is marked; the anatomy is that of one breast");
+      return;
+    }
+    try {
+      findings.anatomy = meshing::compute_anatomy(mesh, side_);
+      if (meshing::mark_ligament_ring(mesh, *findings.anatomy) == 0) {
+        run.warn(fmt::format("no inner face lies within {} mm of the mound's foot; no ligament ring is marked",
+                             meshing::ligament_half_width_mm));
+      }
+    } catch (const InputError& error) {
+      run.warn(fmt::format("no ligament ring is marked: {}", error.what()));
+    }
+  }
+
+  void write(Run& run, const TetMesh& mesh, const Findings& findings) const {
+    run.stage("write");
+    const fs::path target = output.empty() ? fs::path(surface_).parent_path() / "mesh.vtu" : output;
+    if (target.extension() != ".vtu")
+      throw InputError(fmt::format("-o {}: the mesh file ends in .vtu", target.string()));
+    meshing::write_mesh(mesh, run.output(target), side_);
+    fill(run.figures(target), findings);
+    run.say(target.string());
+  }
+
+  Outcome judge(Run& run, const QualityReport& q) const {
+    Outcome outcome = Outcome::done;
+    if (q.inverted > 0 || q.min_dihedral_deg < good_dihedral_deg) {
+      run.warn(fmt::format(
+          "{} inverted tetrahedra, smallest dihedral angle {:.2f} degrees (at least {} is good); the worst is at "
+          "({:.1f}, {:.1f}, {:.1f}) mm: smooth or decimate the surface differently there",
+          q.inverted, q.min_dihedral_deg, good_dihedral_deg, q.worst_place_mm.x(), q.worst_place_mm.y(),
+          q.worst_place_mm.z()));
+      outcome = Outcome::target_not_met;
+    }
+    const double wanted = static_cast<double>(options_.cells);
+    if (wanted > 0 && std::abs(static_cast<double>(q.cells) - wanted) > good_cells_share * wanted) {
+      run.warn(fmt::format("{} tetrahedra instead of {}: the surface's {} triangles are kept and ask for about so many",
+                           q.cells, options_.cells, q.faces));
+      outcome = Outcome::target_not_met;
+    }
+    return outcome;
+  }
+
+  static Json anatomy_json(const meshing::Anatomy& a) {
+    Json json;
+    json["side"] = a.side;
+    json["foot_radius_mm"] = a.foot_radius_mm;
+    json["rim_thickness_mm"] = a.rim_thickness_mm;
+    json["mound_height_mm"] = a.mound_height_mm;
+    json["foot_centre_mm"] = numbers(a.foot_centre_mm);
+    json["outward"] = numbers(a.outward);
+    json["lateral"] = numbers(a.lateral);
+    json["head"] = numbers(a.head);
+    json["nipple_point"] = a.nipple_point;
+    json["foot_fourier_mm"] = std::vector<double>(a.foot_fourier.begin(), a.foot_fourier.end());
+    json["muscle_fit_rms_mm"] = a.muscle->fit_rms_mm();
+    return json;
+  }
+
+  void fill(Json& json, const Findings& findings) const {
+    const QualityReport& q = findings.quality;
+    json["order"] = order_;
+    json["nodes"] = q.nodes;
+    json["cells"] = q.cells;
+    json["triangles"] = q.faces;
+    for (std::size_t r = 1; r < reconstruction::region_names.size(); ++r) {
+      const std::string region(reconstruction::region_names[r]);
+      json["faces"][region] = q.region_faces[r];
+      json["area_cm2"][region] = q.area_cm2[r];
+    }
+    json["volume_ml"] = q.volume_ml;
+    for (int t = 0; t < segmentation::tissue_count; ++t) {
+      if (!segmentation::is_meshed(static_cast<segmentation::Tissue>(t))) continue;
+      json["volumes_ml"]["mesh"][std::string(tissue_names[t])] = q.tissue_ml[t];
+      json["volumes_ml"]["voxels"][std::string(tissue_names[t])] = findings.fractions->voxel_ml[t];
+    }
+    json["outside_labels_share"] = findings.fractions->outside_share;
+    json["inverted"] = q.inverted;
+    json["min_dihedral_deg"] = q.min_dihedral_deg;
+    json["max_dihedral_deg"] = q.max_dihedral_deg;
+    json["smallest_dihedral_histogram_10deg"] = q.smallest_dihedral;
+    json["largest_dihedral_histogram_10deg"] = q.largest_dihedral;
+    json["min_radius_ratio"] = q.min_radius_ratio;
+    json["mean_radius_ratio"] = q.mean_radius_ratio;
+    json["worst_cell"] = q.worst_cell;
+    json["worst_place_mm"] = numbers(q.worst_place_mm);
+    if (findings.anatomy) json["anatomy"] = anatomy_json(*findings.anatomy);
+  }
+
+  static void say(const Run& run, const Findings& findings) {
+    const QualityReport& q = findings.quality;
+    run.say(fmt::format("{} nodes, {} tetrahedra, {} boundary triangles, {:.1f} ml", q.nodes, q.cells, q.faces,
+                        q.volume_ml));
+    run.say(fmt::format("dihedral angles {:.1f} to {:.1f} degrees, radius ratio min {:.3f} mean {:.3f}, {} inverted",
+                        q.min_dihedral_deg, q.max_dihedral_deg, q.min_radius_ratio, q.mean_radius_ratio, q.inverted));
+    run.say(fmt::format("worst tetrahedron {} at ({:.1f}, {:.1f}, {:.1f}) mm", q.worst_cell, q.worst_place_mm.x(),
+                        q.worst_place_mm.y(), q.worst_place_mm.z()));
+    std::string histogram = "smallest angle per tetrahedron, 0-10-20-... degrees:";
+    for (int i = 0; i < 8; ++i) histogram += fmt::format(" {}", q.smallest_dihedral[i]);
+    run.say(histogram);
+    for (std::size_t r = 1; r < reconstruction::region_names.size(); ++r) {
+      run.say(fmt::format("{:<10}{:>8} triangles{:>10.1f} cm2", reconstruction::region_names[r], q.region_faces[r],
+                          q.area_cm2[r]));
+    }
+    for (int t = 0; t < segmentation::tissue_count; ++t) {
+      const double voxels = findings.fractions ? findings.fractions->voxel_ml[t] : 0;
+      if (q.tissue_ml[t] == 0 && voxels == 0) continue;
+      run.say(fmt::format("{:<10}{:>9.1f} ml{}", tissue_names[t], q.tissue_ml[t],
+                          findings.fractions ? fmt::format("  (voxels {:.1f} ml)", voxels) : ""));
+    }
+    if (!findings.anatomy) return;
+    const meshing::Anatomy& a = *findings.anatomy;
+    run.say(fmt::format("{} breast: foot radius {:.1f} mm, rim {:.1f} mm thick, mound {:.1f} mm high", a.side,
+                        a.foot_radius_mm, a.rim_thickness_mm, a.mound_height_mm));
+  }
+
+  std::string surface_, muscle_, labels_, side_ = "left";
+  meshing::TetrahedraliseOptions options_;
+  int order_ = 1;
+  bool check_ = false;
+};
+
+}  // namespace
+}  // namespace supine::pipeline
+
+int main(int argc, char** argv) {
+  supine::pipeline::TetrahedraliseTool tool;
+  return supine::pipeline::tool_main(tool, argc, argv);
+}

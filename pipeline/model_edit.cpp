@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/model_edit.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <string_view>
+#include <vector>
+
+#include "common/error.h"
+#include "pipeline/toml_reader.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using simulation::Effect;
+using simulation::Parameter;
+
+std::string read_text(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || fs::is_directory(file)) throw InputError(fmt::format("cannot read {}", file.string()));
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+std::vector<std::string> split_lines(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+const Effect& known_effect(const std::string& name) {
+  if (const Effect* effect = simulation::find_effect(name)) return *effect;
+  std::vector<std::string> names;
+  for (const Effect* effect : simulation::catalogue()) names.push_back(effect->name());
+  const std::string nearest = nearest_name(name, names);
+  throw InputError(fmt::format("there is no effect \"{}\"; {}", name,
+                               nearest.empty() ? "there are " + listed(names) : "did you mean " + nearest + "?"));
+}
+
+/// First line (0-based) of the block of the effect, or -1.
+int effect_line(const fs::path& file, const std::string& name) {
+  const toml::table table = parse_toml(file);
+  const toml::array* entries = table.get_as<toml::array>("effect");
+  if (!entries) return -1;
+  for (const toml::node& entry : *entries) {
+    const toml::table* effect = entry.as_table();
+    if (effect && (*effect)["name"].value_or(std::string_view()) == name)
+      return static_cast<int>(effect->source().begin.line) - 1;
+  }
+  return -1;
+}
+
+bool starts_table(const std::string& line) {
+  const auto first = line.find_first_not_of(" \t");
+  return first != std::string::npos && line[first] == '[';
+}
+
+bool is_comment_or_blank(const std::string& line) {
+  const auto first = line.find_first_not_of(" \t\r");
+  return first == std::string::npos || line[first] == '#';
+}
+
+/// One past the last line of the block that starts at @p begin.
+std::size_t block_end(const std::vector<std::string>& lines, std::size_t begin) {
+  std::size_t end = begin + 1;
+  while (end < lines.size() && !starts_table(lines[end])) ++end;
+  if (end == lines.size()) return end;
+  while (end > begin + 1 && is_comment_or_blank(lines[end - 1])) --end;
+  return end;
+}
+
+/// Strength is what changes the model at its typical size; an effect without such a row is all strength.
+bool is_strength(const Effect& effect, const Parameter& row) {
+  const auto& rows = effect.parameters();
+  const bool any = std::any_of(rows.begin(), rows.end(), [](const Parameter& r) { return r.median != r.null; });
+  return !any || row.median != row.null;
+}
+
+std::string parameter_line(const Effect& effect, const Parameter& row) {
+  const std::string comment = fmt::format("# {}{}", row.meaning, row.unit == "1" ? "" : ", " + row.unit);
+  if (!is_strength(effect, row)) return fmt::format("{} = {}  {}\n", row.name, row.median, comment);
+  const double prior_sd = row.one_sided ? row.median * std::expm1(row.log_sd) : row.log_sd;
+  return fmt::format("{} = {{ value = {}, prior_sd = {:.3g}, lower = {}, upper = {} }}  {}\n", row.name, row.median,
+                     prior_sd, row.lower, row.upper, comment);
+}
+
+}  // namespace
+
+std::string effect_block(const Effect& effect) {
+  std::string block = fmt::format("[[effect]]  # {}\nname = \"{}\"\n", effect.meaning(), effect.name());
+  for (const Parameter& row : effect.parameters()) block += parameter_line(effect, row);
+  for (const auto& option : effect.options())
+    block += fmt::format("{} = \"{}\"  # {}: {}\n", option.name, option.default_value, listed(option.values),
+                         option.meaning);
+  return block;
+}
+
+std::string with_effect(const fs::path& file, const std::string& name) {
+  const Effect& effect = known_effect(name);
+  if (const int line = effect_line(file, name); line >= 0)
+    throw InputError(fmt::format("{}:{}: the effect {} is there already; change its values, or remove it first",
+                                 file.string(), line + 1, name));
+  std::string text = read_text(file);
+  if (!text.empty() && text.back() != '\n') text += '\n';
+  return text + effect_block(effect);
+}
+
+std::string without_effect(const fs::path& file, const std::string& name) {
+  const int line = effect_line(file, name);
+  if (line < 0) throw InputError(fmt::format("{} has no effect \"{}\" to remove", file.string(), name));
+  const std::vector<std::string> lines = split_lines(read_text(file));
+  const auto begin = static_cast<std::size_t>(line);
+  const std::size_t end = block_end(lines, begin);
+  std::string text;
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    if (i < begin || i >= end) text += lines[i] + "\n";
+  return text;
+}
+
+}  // namespace supine::pipeline

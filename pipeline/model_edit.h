@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "simulation/catalogue.h"
+
+namespace supine::pipeline {
+
+/// The [[effect]] block that stands for @p effect in a model.toml: its strength free, from the catalogue's median
+/// with the catalogue's spread and bounds; its place and shape fixed; units and meanings as comments.
+std::string effect_block(const simulation::Effect& effect);
+
+/// The text of a model.toml with the effect added at the end; everything else, comments too, stays byte for byte.
+/// @param file  what messages name; read for its present content
+/// @throws InputError  unknown effect, effect in the file already, file not readable or not TOML
+std::string with_effect(const std::filesystem::path& file, const std::string& name);
+
+/// The text of a model.toml without the block of the effect: from its [[effect]] line to the next table. Comments
+/// that stand right above the next table belong to that and stay.
+/// @throws InputError  effect not in the file
+std::string without_effect(const std::filesystem::path& file, const std::string& name);
+
+}  // namespace supine::pipeline

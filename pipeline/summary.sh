@@ -1,0 +1,42 @@
+#!/bin/bash
+# SPDX-License-Identifier: AGPL-3.0-or-later
+# Prints the figures of one case from the sidecars in the folder OUT: summary.sh OUT
+set -euo pipefail
+out=${1:?which output folder?}
+
+# figure FILE JQ-EXPRESSION: the value, "-" when the file or the key is not there.
+figure() { if [ -f "$out/$1" ]; then jq -r "($2) // \"-\"" "$out/$1"; else echo "-"; fi; }
+# row NAME UNIT FORMAT VALUE
+row() {
+  local value=$4
+  if [ "$value" != "-" ]; then
+    # shellcheck disable=SC2059
+    value=$(LC_ALL=C printf "$3" "$value")
+  fi
+  printf '  %-34s %12s %s\n' "$1" "$value" "$2"
+}
+
+echo
+echo "Figures of $out"
+if [ -f "$out/labels.json" ]; then
+  jq -r '(.tissues // [])[] | select(.ml > 0) | [.name, .ml] | @tsv' "$out/labels.json" |
+    while IFS=$'\t' read -r tissue ml; do row "$tissue" ml %.1f "$ml"; done
+fi
+row "triangles, reconstructed" "" %d "$(figure breast.json .triangles)"
+row "triangles, decimated" "" %d "$(figure coarse.json .triangles)"
+row "tetrahedra" "" %d "$(figure mesh.json .cells)"
+row "sag (undeformed to prone, max)" mm %.2f "$(figure prone.json .sag_max_mm)"
+row "sag (undeformed to supine, max)" mm %.2f "$(figure supine.json .sag_max_mm)"
+row "round trip to the imaged shape" mm %.1e "$(figure supine.json .round_trip_max_mm)"
+if [ -f "$out/comparison.json" ]; then
+  row "MAE (model to scan, study)" mm %.2f "$(figure comparison.json .mae_study_mm)"
+  row "MAE (scan to model)" mm %.2f "$(figure comparison.json .mae_mm)"
+  row "RMS" mm %.2f "$(figure comparison.json .rms_mm)"
+  row "95th percentile" mm %.2f "$(figure comparison.json .p95_mm)"
+  row "maximum" mm %.2f "$(figure comparison.json .hausdorff_mm)"
+fi
+echo
+echo "For ParaView, in $out:"
+for file in labels.vti breast.vtp muscle.vtp coarse.vtp mesh.vtu prone.vtu undeformed.vtu supine.vtu comparison.vtp scan.vtp; do
+  if [ -f "$out/$file" ]; then printf '  %s\n' "$file"; fi
+done

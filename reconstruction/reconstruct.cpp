@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "reconstruction/reconstruct.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "common/error.h"
+#include "reconstruction/fairing.h"
+#include "reconstruction/mesh_edges.h"
+
+namespace supine::reconstruction {
+namespace {
+
+using segmentation::LabelImage;
+using segmentation::Tissue;
+
+constexpr double default_smooth_voxels = 0.75;
+constexpr double largest_offset_voxels = 0.3;
+constexpr Tissue organ_tissues[] = {Tissue::gland, Tissue::tumour, Tissue::nipple, Tissue::vessel};
+
+// Moves every piece along its normals until it has the volume of its voxels.
+void restore_volume(const VoxelSurface& voxels, double bound_mm, Surface& surface) {
+  const std::size_t pieces = voxels.piece_volume_mm3.size();
+  std::vector<double> offset_mm(pieces, 0.0);
+  for (int round = 0; round < 3; ++round) {
+    std::vector<double> volume(pieces, 0.0), area(pieces, 0.0);
+    for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
+      const int piece = voxels.piece(surface.triangles(t, 0));
+      const Eigen::RowVector3d a = surface.points.row(surface.triangles(t, 0)),
+                               b = surface.points.row(surface.triangles(t, 1)),
+                               c = surface.points.row(surface.triangles(t, 2));
+      volume[piece] += a.dot(b.cross(c)) / 6;
+      area[piece] += 0.5 * (b - a).cross(c - a).norm();
+    }
+    std::vector<double> step(pieces, 0.0);
+    for (std::size_t i = 0; i < pieces; ++i) {
+      if (area[i] <= 0) continue;
+      const double wanted = offset_mm[i] + (voxels.piece_volume_mm3[i] - volume[i]) / area[i];
+      step[i] = std::clamp(wanted, -bound_mm, bound_mm) - offset_mm[i];
+      offset_mm[i] += step[i];
+    }
+    const Points normals = point_normals(surface.points, surface.triangles);
+    for (Eigen::Index p = 0; p < normals.rows(); ++p) surface.points.row(p) += step[voxels.piece(p)] * normals.row(p);
+  }
+}
+
+// Halves the displacement from the staircase around crossings until there are none. @return points that were held back
+Eigen::Index remove_crossings(const Points& staircase, Surface& surface) {
+  const Points displacement = surface.points - staircase;
+  const auto neighbours = point_neighbours(mesh_edges(surface.triangles), surface.points.rows());
+  Eigen::VectorXd share = Eigen::VectorXd::Ones(surface.points.rows());
+  constexpr int most_rounds = 40;
+  for (int round = 0; round < most_rounds; ++round) {
+    const auto crossings = self_intersections(surface);
+    if (crossings.empty()) return (share.array() < 1).count();
+    std::vector<char> hit(surface.points.rows(), 0);
+    for (const auto& [a, b] : crossings)
+      for (int c = 0; c < 3; ++c) hit[surface.triangles(a, c)] = hit[surface.triangles(b, c)] = 1;
+    const std::vector<char> core = hit;
+    for (std::size_t p = 0; p < core.size(); ++p)
+      if (core[p])
+        for (const int n : neighbours[p]) hit[n] = 1;
+    for (std::size_t p = 0; p < hit.size(); ++p)
+      if (hit[p]) share(static_cast<Eigen::Index>(p)) *= round < most_rounds / 2 ? 0.5 : 0;
+    surface.points = staircase + displacement.cwiseProduct(share.replicate<1, 3>());
+  }
+  const auto crossings = self_intersections(surface);
+  if (!crossings.empty())
+    throw NumericalFailure(
+        fmt::format("the smoothed surface crosses itself in {} places and could not be repaired; give a "
+                    "smaller --smooth-mm",
+                    crossings.size()));
+  return (share.array() < 1).count();
+}
+
+OrganSurface finish(std::string name, const VoxelSurface& voxels, Eigen::VectorXi region, const LabelImage& image,
+                    const ReconstructOptions& options) {
+  OrganSurface organ;
+  organ.name = std::move(name);
+  Surface surface = voxels.surface;
+  surface.region = std::move(region);
+  FairingOptions fairing;
+  fairing.spacing_mm = image.grid.spacing_mm;
+  fairing.length_mm = options.smooth_mm.value_or(default_smooth_voxels * image.grid.spacing_mm.maxCoeff());
+  surface.points = fair(surface, fairing);
+  restore_volume(voxels, largest_offset_voxels * image.grid.spacing_mm.minCoeff(), surface);
+  organ.less_smooth_points = remove_crossings(voxels.surface.points, surface);
+  organ.surface = to_patient(std::move(surface), image.grid);
+  organ.report = check_surface(organ.surface);
+  organ.voxel_volume_mm3 = voxels.voxel_volume_mm3();
+  organ.voxel_components = static_cast<int>(voxels.piece_volume_mm3.size());
+  organ.dropped_pieces = voxels.dropped_pieces;
+  organ.dropped_volume_mm3 = voxels.dropped_volume_mm3;
+  return organ;
+}
+
+void require_tissues(const LabelImage& image) {
+  bool meshed = false, muscle = false;
+  for (const std::uint8_t voxel : image.voxels) {
+    meshed |= is_meshed(static_cast<Tissue>(voxel));
+    muscle |= static_cast<Tissue>(voxel) == Tissue::muscle;
+  }
+  if (!meshed)
+    throw InputError(
+        "the labels hold no tissue to mesh (adipose, gland, skin, ...); check the table [image.labels] of case.toml");
+  if (!muscle)
+    throw InputError(
+        "the labels hold no muscle; the breast needs something to lie on: label the chest wall as `muscle` in "
+        "[image.labels] of case.toml");
+}
+
+// The faces of one region, turned round, as a surface of their own.
+Surface reversed_region(const Surface& surface, Region region) {
+  Surface sheet;
+  std::vector<int> renumbered(surface.points.rows(), -1);
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t)
+    if (surface.region(t) == static_cast<int>(region)) kept.push_back(t);
+  sheet.triangles.resize(static_cast<Eigen::Index>(kept.size()), 3);
+  sheet.points.resize(surface.points.rows(), 3);
+  int points = 0;
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    for (int c = 0; c < 3; ++c) {
+      const int p = surface.triangles(kept[i], 2 - c);
+      if (renumbered[p] < 0) {
+        sheet.points.row(points) = surface.points.row(p);
+        renumbered[p] = points++;
+      }
+      sheet.triangles(static_cast<Eigen::Index>(i), c) = renumbered[p];
+    }
+  sheet.points.conservativeResize(points, 3);
+  return sheet;
+}
+
+}  // namespace
+
+void ReconstructOptions::check() const {
+  if (smooth_mm && !(*smooth_mm >= 0)) throw InputError(fmt::format("smooth_mm is {}; it must be >= 0", *smooth_mm));
+  if (!(cut.rim_mm > 0)) throw InputError(fmt::format("rim_mm is {}; it must be > 0", cut.rim_mm));
+  if (!(smallest_piece_mm3 >= 0))
+    throw InputError(fmt::format("smallest_piece_mm3 is {}; it must be >= 0", smallest_piece_mm3));
+}
+
+Reconstruction reconstruct(const LabelImage& image, const ReconstructOptions& options) {
+  options.check();
+  require_tissues(image);
+  Reconstruction result;
+  const VoxelSurface breast = voxel_surface(image, meshed_tissues(), options.smallest_piece_mm3);
+  result.breast = finish("breast", breast, regions_of(breast, image, options.cut), image, options);
+  result.muscle = reversed_region(result.breast.surface, Region::inner);
+  if (result.muscle.triangles.rows() == 0)
+    throw InputError("no tissue to be meshed borders on the muscle; check the labels of muscle and of what lies on it");
+  for (const Tissue tissue : organ_tissues) {
+    const VoxelSurface organ = voxel_surface(image, only(tissue));
+    if (organ.surface.triangles.rows() > 0)
+      result.organs.push_back(
+          finish(std::string(segmentation::tissue_names[static_cast<int>(tissue)]), organ, {}, image, options));
+  }
+  return result;
+}
+
+}  // namespace supine::reconstruction

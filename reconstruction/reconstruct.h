@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "reconstruction/regions.h"
+#include "reconstruction/surface_check.h"
+
+namespace supine::reconstruction {
+
+struct ReconstructOptions {
+  CutRules cut;
+  /// Fairing length, mm, >= 0 (see FairingOptions); nothing = 0.75 of the largest voxel side.
+  std::optional<double> smooth_mm;
+  /// Loose bits of meshed tissue below this are left out of the breast: a solver cannot hold them.
+  double smallest_piece_mm3 = 100;
+
+  void check() const;  ///< @throws InputError naming option, value and bound
+};
+
+/// A closed surface with what was measured on it.
+struct OrganSurface {
+  std::string name;             ///< "breast", or the tissue's name
+  Surface surface;              ///< closed, manifold, outward, no self-intersections; LPS mm
+  SurfaceReport report;         ///< of the surface
+  double voxel_volume_mm3 = 0;  ///< of the voxels it stands for
+  int voxel_components = 0;     ///< pieces of those voxels, joined through faces
+  int dropped_pieces = 0;       ///< left out for their size (breast only)
+  double dropped_volume_mm3 = 0;
+  Eigen::Index less_smooth_points =
+      0;  ///< points kept nearer to the staircase because the smooth surface crossed itself
+
+  double volume_error() const { return report.volume_mm3 / voxel_volume_mm3 - 1; }
+};
+
+struct Reconstruction {
+  OrganSurface breast;  ///< boundary of all tissues that are meshed, with regions inner, skin and cut
+  Surface muscle;       ///< breast-facing muscle sheet, open: the inner faces turned round, so normals face the breast
+  std::vector<OrganSurface> organs;  ///< gland, tumour, nipple and vessel, as far as there are any
+};
+
+/// Makes the surfaces of a label volume.
+///
+/// Marching cubes on the labels, regions from the voxel beyond, fairing within half a voxel (see fair()), and a normal
+/// offset (at most 0.3 voxels) that gives every piece the volume of its voxels. Where the result crosses itself it is
+/// taken back toward the staircase, which does not.
+/// @throws InputError  no tissue to mesh, no muscle, no part of the tissue on the muscle, or a cut that is not allowed
+///   (see regions_of)
+Reconstruction reconstruct(const segmentation::LabelImage& image, const ReconstructOptions& options);
+
+}  // namespace supine::reconstruction

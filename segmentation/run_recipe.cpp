@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "segmentation/run_recipe.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "common/error.h"
+#include "segmentation/grow.h"
+#include "segmentation/intensity.h"
+#include "segmentation/masks.h"
+
+namespace supine::segmentation {
+namespace {
+
+/// The state the steps share; one overload of run per kind of step, which returns its line of the log.
+class Kitchen {
+ public:
+  explicit Kitchen(GreyImage image)
+      : image_(std::move(image)), labels_{image_.grid, std::vector<std::uint8_t>(image_.voxels.size(), 0)} {}
+
+  std::string run(const NoiseFloor& step) {
+    return fmt::format("noise sigma {:.4g}", remove_noise_floor(image_, step));
+  }
+  std::string run(const Bias& step) {
+    const BiasFit fit = correct_bias(image_, step);
+    return fmt::format("shading {:.3f} to {:.3f}, residual sd {:.3f} over {} voxels", fit.lowest, fit.highest,
+                       fit.residual_sd, fit.voxels);
+  }
+  std::string run(const Smooth& step) {
+    smooth(image_, step);
+    return fmt::format("{:g} mm", step.radius_mm);
+  }
+  std::string run(const Threshold& step);
+  std::string run(const Grow& step);
+  std::string run(const Islands& step) {
+    return store(step.mask, keep_islands(mask(step.mask), grid(), static_cast<std::size_t>(step.keep_largest),
+                                         voxels(step.min_ml)));
+  }
+  std::string run(const Holes& step) {
+    return store(step.mask, fill_holes(mask(step.mask), grid(), voxels(step.max_ml)));
+  }
+  std::string run(const Combine& step);
+  std::string run(const Morph& step);
+  std::string run(const Layer& step);
+  std::string run(const Region& step);
+  std::string run(const Paint& step);
+
+  LabelImage take_labels() { return std::move(labels_); }
+
+ private:
+  const Grid& grid() const { return image_.grid; }
+  /// Volumes are compared with whole voxels; the hair absorbs rounding.
+  double voxels(double ml) const { return ml * 1000 / grid().voxel_volume_mm3() * (1 + 1e-9); }
+  const Mask& mask(const std::string& name) const;
+  Mask within(const std::string& name) const { return name.empty() ? Mask() : mask(name); }
+  std::string store(const std::string& name, Mask mask);
+
+  GreyImage image_;
+  LabelImage labels_;
+  std::map<std::string, Mask> masks_;
+};
+
+const Mask& Kitchen::mask(const std::string& name) const {
+  const auto found = masks_.find(name);
+  if (found != masks_.end()) return found->second;
+  std::string known;
+  for (const auto& [other, voxels] : masks_) known += fmt::format("{}\"{}\"", known.empty() ? "" : ", ", other);
+  throw InputError(
+      fmt::format("no earlier step made the mask \"{}\"; there are {}", name, known.empty() ? "none" : known));
+}
+
+std::string Kitchen::store(const std::string& name, Mask mask) {
+  const auto count = static_cast<std::size_t>(std::count(mask.begin(), mask.end(), 1));
+  if (count == 0)
+    throw InputError(
+        fmt::format("the mask \"{}\" comes out empty; check the greys, seeds and places of this step", name));
+  masks_[name] = std::move(mask);
+  return fmt::format("{}: {} voxels, {:.1f} ml", name, count,
+                     static_cast<double>(count) * grid().voxel_volume_mm3() / 1000);
+}
+
+std::string Kitchen::run(const Threshold& step) {
+  Mask result = step.within.empty() ? Mask(image_.voxels.size(), 1) : mask(step.within);
+  for (std::size_t n = 0; n < result.size(); ++n) result[n] = result[n] && step.grey.contains(image_.voxels[n]);
+  return store(step.mask, std::move(result));
+}
+
+std::string Kitchen::run(const Grow& step) {
+  GrowResult grown = grow(image_, step, within(step.within));
+  return store(step.mask, std::move(grown.mask)) +
+         fmt::format(", greys {:.4g} to {:.4g}", grown.range.lower, grown.range.upper);
+}
+
+std::string Kitchen::run(const Combine& step) {
+  Mask result(image_.voxels.size(), step.any.empty() ? 1 : 0);
+  for (const auto& name : step.any) {
+    const Mask& other = mask(name);
+    for (std::size_t n = 0; n < result.size(); ++n) result[n] |= other[n];
+  }
+  for (const auto& name : step.without) {
+    const Mask& other = mask(name);
+    for (std::size_t n = 0; n < result.size(); ++n) result[n] = result[n] && !other[n];
+  }
+  return store(step.mask, std::move(result));
+}
+
+std::string Kitchen::run(const Morph& step) {
+  const Mask& before = mask(step.mask);
+  const double r = step.radius_mm;
+  switch (step.kind) {
+    case Morph::Kind::dilate:
+      return store(step.mask, dilate(before, grid(), r));
+    case Morph::Kind::erode:
+      return store(step.mask, erode(before, grid(), r));
+    case Morph::Kind::open:
+      return store(step.mask, dilate(erode(before, grid(), r), grid(), r));
+    default:
+      return store(step.mask, erode(dilate(before, grid(), r), grid(), r));
+  }
+}
+
+std::string Kitchen::run(const Layer& step) {
+  Mask result = mask(step.of);
+  const Mask core = erode(result, grid(), step.thickness_mm);
+  for (std::size_t n = 0; n < result.size(); ++n) result[n] = result[n] && !core[n];
+  return store(step.mask, std::move(result));
+}
+
+bool inside(const Region& region, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d from = point - region.centre_mm, axis = region.axis.normalized();
+  switch (region.shape) {
+    case Region::Shape::cylinder:
+      return (from - axis * axis.dot(from)).norm() <= region.radius_mm;
+    case Region::Shape::sphere:
+      return from.norm() <= region.radius_mm;
+    case Region::Shape::box:
+      return (from.cwiseAbs().array() <= region.half_mm.array()).all();
+    default:
+      return axis.dot(from) >= 0;
+  }
+}
+
+std::string Kitchen::run(const Region& step) {
+  Mask result(image_.voxels.size());
+  const Eigen::Vector3i size = grid().size;
+#pragma omp parallel for schedule(static)
+  for (int k = 0; k < size.z(); ++k)
+    for (int j = 0; j < size.y(); ++j)
+      for (int i = 0; i < size.x(); ++i)
+        result[grid().index(i, j, k)] = inside(step, grid().point(Eigen::Vector3d(i, j, k)));
+  return store(step.mask, std::move(result));
+}
+
+std::string Kitchen::run(const Paint& step) {
+  const Mask& where = mask(step.mask);
+  std::size_t painted = 0;
+  for (std::size_t n = 0; n < where.size(); ++n) {
+    const auto old = static_cast<Tissue>(labels_.voxels[n]);
+    if (!where[n] || (!step.over.empty() && std::find(step.over.begin(), step.over.end(), old) == step.over.end()))
+      continue;
+    labels_.voxels[n] = static_cast<std::uint8_t>(step.tissue);
+    ++painted;
+  }
+  return fmt::format("{}: {} voxels", tissue_names[static_cast<int>(step.tissue)], painted);
+}
+
+constexpr const char* step_names[] = {"noise_floor", "bias",    "smooth", "threshold", "grow",   "islands",
+                                      "holes",       "combine", "morph",  "layer",     "region", "paint"};
+static_assert(std::size(step_names) == std::variant_size_v<Step>);
+
+}  // namespace
+
+RecipeResult run_recipe(GreyImage image, const Recipe& recipe,
+                        const std::function<void(const std::string&)>& progress) {
+  Kitchen kitchen(std::move(image));
+  RecipeResult result;
+  for (std::size_t s = 0; s < recipe.steps.size(); ++s) {
+    const std::string title = fmt::format("step {} ({})", s + 1, step_names[recipe.steps[s].index()]);
+    if (progress) progress(fmt::format("{} of {}", title, recipe.steps.size()));
+    try {
+      const auto line = std::visit([&kitchen](const auto& step) { return kitchen.run(step); }, recipe.steps[s]);
+      result.log.push_back(title + ": " + line);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("segmentation recipe, {}: {}", title, error.what()));
+    }
+  }
+  result.labels = kitchen.take_labels();
+  return result;
+}
+
+}  // namespace supine::segmentation

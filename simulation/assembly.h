@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <cstdint>
+#include <vector>
+
+#include "common/arrays.h"
+
+namespace supine::simulation {
+
+using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
+
+/// Sparsity of the 3-by-3 node blocks of a mesh: nodes that share a cell. Made once per mesh.
+class Pattern {
+ public:
+  Pattern(const Indices& cells, Eigen::Index nodes);
+
+  Eigen::Index dofs() const { return 3 * nodes_; }
+  /// A matrix with this pattern and zero values; entry storage order as entry() says.
+  SparseMatrix zero_matrix() const;
+  /// Offset of block (a, b)'s first entry in the value array; its column k, row i is at offset + k * stride(b) + i.
+  int block(int a, int b) const;
+  int stride(int b) const { return 3 * (first_[b + 1] - first_[b]); }
+
+ private:
+  Eigen::Index nodes_;
+  std::vector<int> first_;      // nodes + 1
+  std::vector<int> neighbour_;  // sorted within each node
+};
+
+/// Elements of one kind: nodes, value positions, and colours within which no two elements share a node, so that
+/// they may add to the sums at the same time and every sum has one order whatever the number of threads.
+class Elements {
+ public:
+  Elements(Indices nodes, const Pattern& pattern);
+
+  const Indices& nodes() const { return nodes_; }
+  Eigen::Index count() const { return nodes_.rows(); }
+  const std::vector<std::vector<int>>& colours() const { return colours_; }
+  /// Positions of the n × n node blocks of element @p e, row-major over (a, b).
+  const int* blocks(int e) const {
+    return blocks_.data() + static_cast<std::size_t>(e) * nodes_.cols() * nodes_.cols();
+  }
+  /// Strides of the n column nodes of element @p e.
+  const int* strides(int e) const { return strides_.data() + static_cast<std::size_t>(e) * nodes_.cols(); }
+
+ private:
+  Indices nodes_;
+  std::vector<int> blocks_, strides_;
+  std::vector<std::vector<int>> colours_;
+};
+
+/// What a pass over the elements is to compute.
+struct Demand {
+  bool energy = false;
+  bool residual = false;
+  bool tangent = false;            ///< ∂r/∂x
+  bool reference_tangent = false;  ///< ∂r/∂X
+};
+
+/// The sums over all terms. Matrices must have the pattern; sizes are set once and reused.
+struct Sums {
+  double energy = 0;                        ///< mN mm
+  Eigen::VectorXd residual;                 ///< r = ∂(energy)/∂x, mN, dof 3 node + axis
+  SparseMatrix tangent, reference_tangent;  ///< mN/mm
+  double min_det_f = 1;  ///< smallest det F over quadrature points; <= 0 where an element is inverted
+  int min_cell = -1;     ///< where
+  bool valid = true;     ///< no element is inverted, in x or in X
+  std::vector<double> element_energy, element_det_f;  ///< buffers of add_elements
+
+  explicit Sums(const Pattern& pattern);
+  void clear(const Demand& demand);
+};
+
+/// Contribution of one element.
+template <int Nodes>
+struct Local {
+  static constexpr int dofs = 3 * Nodes;
+  double energy = 0;
+  double min_det_f = 1e300;  ///< smallest det F of the element; <= 0 marks it inverted and its sums are void
+  Eigen::Matrix<double, dofs, 1> residual;
+  Eigen::Matrix<double, dofs, dofs> tangent, reference_tangent;
+};
+
+/// Adds kernel(element, local) of every element to the sums; the kernel fills what is demanded, from zero.
+template <int Nodes, class Kernel>
+void add_elements(const Elements& elements, const Demand& demand, Sums& sums, const Kernel& kernel) {
+  constexpr int n = Nodes;
+  sums.element_energy.resize(elements.count());
+  sums.element_det_f.resize(elements.count());
+  const auto scatter = [](const Eigen::Matrix<double, 3 * n, 3 * n>& local, const int* blocks, const int* strides,
+                          double* values) {
+    for (int b = 0; b < n; ++b)
+      for (int a = 0; a < n; ++a)
+        for (int k = 0; k < 3; ++k) {
+          double* column = values + blocks[a * n + b] + k * strides[b];
+          for (int i = 0; i < 3; ++i) column[i] += local(3 * a + i, 3 * b + k);
+        }
+  };
+  for (const auto& colour : elements.colours()) {
+    const int size = static_cast<int>(colour.size());
+#pragma omp parallel for schedule(static) if (size > 32)
+    for (int s = 0; s < size; ++s) {
+      const int e = colour[s];
+      Local<n> local;
+      local.residual.setZero();
+      if (demand.tangent || demand.reference_tangent) local.tangent.setZero();
+      if (demand.reference_tangent) local.reference_tangent.setZero();
+      kernel(e, local);
+      sums.element_energy[e] = local.energy;
+      sums.element_det_f[e] = local.min_det_f;
+      if (demand.residual)
+        for (int a = 0; a < n; ++a)
+          sums.residual.template segment<3>(3 * elements.nodes()(e, a)) += local.residual.template segment<3>(3 * a);
+      if (demand.tangent) scatter(local.tangent, elements.blocks(e), elements.strides(e), sums.tangent.valuePtr());
+      if (demand.reference_tangent)
+        scatter(local.reference_tangent, elements.blocks(e), elements.strides(e), sums.reference_tangent.valuePtr());
+    }
+  }
+  for (int e = 0; e < elements.count(); ++e) {
+    sums.energy += sums.element_energy[e];
+    if (sums.element_det_f[e] < sums.min_det_f) {
+      sums.min_det_f = sums.element_det_f[e];
+      sums.min_cell = e;
+    }
+  }
+  if (!(sums.min_det_f > 0)) sums.valid = false;
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "simulation/catalogue.h"
+
+namespace supine::simulation {
+
+/// The breast attached to the pectoral muscle instead of sliding on it: k_t × exp(log_factor) on the whole interface.
+class Adhesion : public Effect {
+ public:
+  std::string name() const override { return "adhesion"; }
+  std::string meaning() const override { return "inner surface attached to the muscle instead of sliding"; }
+  const std::vector<Parameter>& parameters() const override;
+  void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
+             Fields<Dual>& fields) const override;
+};
+
+}  // namespace supine::simulation

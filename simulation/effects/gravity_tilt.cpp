@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/gravity_tilt.h"
+
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+
+const std::vector<Parameter>& GravityTilt::parameters() const {
+  static const std::vector<Parameter> rows = {
+      {"roll_rad", "rad", 0, -0.6, 0.6, 0, 0.15, false, "rotation about the head axis (+z LPS)"},
+      {"pitch_rad", "rad", 0, -0.6, 0.6, 0, 0.15, false, "rotation about the left axis (+x LPS)"}};
+  return rows;
+}
+
+void GravityTilt::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
+                        Fields<Dual>& fields) const {
+  if (scene.pose == "prone") return;
+  const Dual cr = ceres::cos(values[0]), sr = ceres::sin(values[0]), cp = ceres::cos(values[1]),
+             sp = ceres::sin(values[1]);
+  const Eigen::Matrix<Dual, 3, 1> g = fields.gravity;
+  const Eigen::Matrix<Dual, 3, 1> pitched(g.x(), cp * g.y() - sp * g.z(), sp * g.y() + cp * g.z());
+  fields.gravity = {cr * pitched.x() - sr * pitched.y(), sr * pitched.x() + cr * pitched.y(), pitched.z()};
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "simulation/catalogue.h"
+
+namespace supine::simulation {
+
+/// The patient does not lie as the case says: gravity of every pose but prone turned about the patient's head-foot
+/// axis (roll) and left-right axis (pitch), right-handed.
+class GravityTilt : public Effect {
+ public:
+  std::string name() const override { return "gravity_tilt"; }
+  std::string meaning() const override { return "gravity of the measured poses points elsewhere than the case says"; }
+  const std::vector<Parameter>& parameters() const override;
+  void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
+             Fields<Dual>& fields) const override;
+};
+
+}  // namespace supine::simulation

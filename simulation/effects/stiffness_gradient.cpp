@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/stiffness_gradient.h"
+
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+
+const std::vector<Parameter>& StiffnessGradient::parameters() const {
+  static const std::vector<Parameter> rows = {
+      {"lateral", "1", 0, -1.5, 1.5, 0, 0.5, false, "change of ln E per foot radius toward the outer side"},
+      {"head", "1", 0, -1.5, 1.5, 0, 0.5, false, "change of ln E per foot radius toward the head"}};
+  return rows;
+}
+
+void StiffnessGradient::apply(const Scene& scene, std::span<const Dual> values,
+                              const std::map<std::string, std::string>&, Fields<Dual>& fields) const {
+  const Table& q = scene.layout.cell_q;
+  for (Eigen::Index c = 0; c < fields.ln_young.size(); ++c)
+    fields.ln_young[c] += values[0] * q(c, 0) + values[1] * q(c, 1);
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "segmentation/tissue.h"
+#include "simulation/catalogue.h"
+
+namespace supine::simulation {
+
+/// A tissue that is stiffer (or softer) than the rest: ln E += log_ratio × fraction of that tissue in the cell.
+class TissueStiffness : public Effect {
+ public:
+  explicit TissueStiffness(segmentation::Tissue tissue, Parameter row) : tissue_(tissue), rows_{std::move(row)} {}
+  std::string name() const override {
+    return std::string(segmentation::tissue_names[static_cast<int>(tissue_)]) + "_stiffness";
+  }
+  std::string meaning() const override;
+  const std::vector<Parameter>& parameters() const override { return rows_; }
+  void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
+             Fields<Dual>& fields) const override;
+
+ private:
+  segmentation::Tissue tissue_;
+  std::vector<Parameter> rows_;
+};
+
+}  // namespace supine::simulation

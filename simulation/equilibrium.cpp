@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/equilibrium.h"
+
+#include <fmt/format.h>
+
+#include "common/error.h"
+
+namespace supine::simulation {
+namespace {
+
+constexpr double sufficient_decrease = 1e-4;  // Armijo constant
+constexpr int max_halvings = 12;
+constexpr double longest_step_mm = 40;  // a Newton step beyond this is shortened before the line search
+
+using Flat = Eigen::Map<Eigen::VectorXd>;
+
+}  // namespace
+
+EquilibriumSolver::EquilibriumSolver(const Mechanics& mechanics, SolveOptions options)
+    : mechanics_(mechanics), options_(std::move(options)), sums_(mechanics.pattern()) {}
+
+SolveReport EquilibriumSolver::forward(const Points& X, Points& x, const std::string& what) {
+  if (!cholesky_) cholesky_ = std::make_unique<CholeskySolver>(sums_.tangent);
+  x = X;
+  return step_load(Unknown::deformed, X, x, what);
+}
+
+SolveReport EquilibriumSolver::inverse(const Points& x, Points& X, const std::string& what) {
+  if (!lu_) lu_ = std::make_unique<LuSolver>(sums_.reference_tangent);
+  X = x;
+  return step_load(Unknown::undeformed, x, X, what);
+}
+
+SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, Points& sought,
+                                         const std::string& what) {
+  mechanics_.evaluate(State{known, known, 1.0}, Demand{.residual = true}, sums_);
+  weight_norm_ = sums_.residual.norm();
+  SolveReport report;
+  double load = 0, step = 1;
+  Points at_load = sought, trial;
+  Attempt last;
+  while (load < 1) {
+    const double target = std::min(1.0, load + step);
+    trial = at_load;
+    last = newton(unknown, known, trial, target);
+    report.newton_iterations += last.iterations;
+    if (last.converged) {
+      load = target;
+      at_load = trial;
+      ++report.load_steps;
+      report.residual_share = last.residual_share;
+      report.min_det_f = last.min_det_f;
+      if (last.iterations <= 8) step *= 2;
+      continue;
+    }
+    step = 0.5 * std::min(step, target - load);
+    if (step >= options_.smallest_load_step) continue;
+    const std::string place = [&] {
+      if (last.min_cell < 0) return std::string();
+      Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
+      for (int a = 0; a < 4; ++a) centre += 0.25 * at_load.row(mechanics_.mesh().cells(last.min_cell, a));
+      return fmt::format("; smallest det F {:.3g} in cell {} at ({:.1f}, {:.1f}, {:.1f}) mm", last.min_det_f,
+                         last.min_cell, centre.x(), centre.y(), centre.z());
+    }();
+    throw NumericalFailure(fmt::format(
+        "{}: no equilibrium found beyond {:.0f} % of gravity ({}{}). A softer tissue than this shape can carry, or a "
+        "poor mesh there: raise breast.young_modulus_kpa or skin.young_modulus_kpa, use law = \"neo_hookean\", or "
+        "look at the mesh with supine-tetrahedralise --check",
+        what, 100 * load, last.reason, place));
+  }
+  sought = at_load;
+  return report;
+}
+
+void EquilibriumSolver::evaluate(Unknown unknown, const Points& known, const Points& sought, double load) {
+  const bool forward = unknown == Unknown::deformed;
+  const Demand demand{.energy = forward, .residual = true, .tangent = forward, .reference_tangent = !forward};
+  mechanics_.evaluate(forward ? State{sought, known, load} : State{known, sought, load}, demand, sums_);
+}
+
+bool EquilibriumSolver::direction(Unknown unknown, Eigen::VectorXd& step) {
+  if (unknown == Unknown::undeformed) {
+    if (!lu_->factorise(sums_.reference_tangent)) return false;
+    step = -lu_->solve(sums_.residual);
+    return step.allFinite();
+  }
+  // Where the energy is not convex the smallest shift that makes it so gives a descent direction.
+  double shift = 0;
+  const double scale = sums_.tangent.diagonal().cwiseAbs().mean();
+  for (int attempt = 0; attempt < 9; ++attempt) {
+    if (cholesky_->factorise(sums_.tangent, shift)) {
+      step = -cholesky_->solve(sums_.residual);
+      return step.allFinite();
+    }
+    shift = shift == 0 ? 1e-4 * scale : 6 * shift;
+  }
+  return false;
+}
+
+EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Points& known, Points& sought,
+                                                     double load) {
+  const bool use_energy = unknown == Unknown::deformed && mechanics_.has_energy();
+  const double tolerance = options_.residual_tolerance * weight_norm_;
+  Attempt attempt;
+  Eigen::VectorXd step;
+  Points start;
+  evaluate(unknown, known, sought, load);
+  for (int iteration = 0;; ++iteration) {
+    const double norm = sums_.residual.norm(), energy = sums_.energy;
+    attempt.min_det_f = sums_.min_det_f;
+    attempt.min_cell = sums_.min_cell;
+    attempt.residual_share = weight_norm_ > 0 ? norm / weight_norm_ : 0;
+    if (!sums_.valid) return attempt.reason = "an element is inverted", attempt;
+    if (options_.progress) options_.progress(load, iteration, attempt.residual_share);
+    if (norm <= tolerance) return attempt.converged = true, attempt;
+    if (iteration == options_.max_iterations)
+      return attempt.reason = fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance",
+                                          iteration, attempt.residual_share),
+             attempt;
+    ++attempt.iterations;
+    if (!direction(unknown, step)) return attempt.reason = "the tangent matrix is singular", attempt;
+    const double longest = step.cwiseAbs().maxCoeff();
+    if (longest > longest_step_mm) step *= longest_step_mm / longest;
+    const double slope = sums_.residual.dot(step);
+
+    start = sought;
+    double alpha = 1;
+    bool accepted = false;
+    for (int halving = 0; halving <= max_halvings && !accepted; ++halving, alpha *= accepted ? 1 : 0.5) {
+      Flat(sought.data(), sought.size()) = Flat(start.data(), start.size()) + alpha * step;
+      evaluate(unknown, known, sought, load);
+      if (!sums_.valid) continue;
+      const double now = sums_.residual.norm();
+      const double rounding = 1e-13 * (std::abs(energy) + std::abs(sums_.energy));
+      accepted = use_energy ? sums_.energy <= energy + sufficient_decrease * alpha * slope + rounding
+                            : now <= (1 - sufficient_decrease * alpha) * norm;
+      // The last steps move by rounding only: there neither merit says anything.
+      if (alpha == 1 && longest < options_.step_tolerance_mm) accepted = true;
+    }
+    if (!accepted) {
+      sought = start;
+      return attempt.reason = fmt::format("the line search stalled with {:.1e} of the weight out of balance",
+                                          attempt.residual_share),
+             attempt;
+    }
+    if (longest < options_.step_tolerance_mm) {
+      attempt.converged = true;
+      attempt.min_det_f = sums_.min_det_f;
+      attempt.min_cell = sums_.min_cell;
+      attempt.residual_share = weight_norm_ > 0 ? sums_.residual.norm() / weight_norm_ : 0;
+      return attempt;
+    }
+  }
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "simulation/linear_solver.h"
+#include "simulation/mechanics.h"
+
+namespace supine::simulation {
+
+struct SolveOptions {
+  int max_iterations = 40;            ///< Newton steps per load step
+  double step_tolerance_mm = 1e-8;    ///< the last full Newton step moved no node further
+  double residual_tolerance = 1e-11;  ///< or |r| is under this share of the weight
+  double smallest_load_step = 1.0 / 128;
+  std::function<void(double load, int iteration, double residual_share)> progress;  ///< may be empty
+};
+
+struct SolveReport {
+  int newton_iterations = 0;  ///< factorisations, over all load steps
+  int load_steps = 0;         ///< completed
+  double min_det_f = 1;
+  double residual_share = 0;  ///< |r| / |weight| at the end
+};
+
+/// Finds equilibrium r(x, X) = 0 by Newton's method with exact tangents, line search and adaptive load steps
+/// (the full load is tried first; a step that fails is halved). Symbolic analysis is done once per object.
+class EquilibriumSolver {
+ public:
+  explicit EquilibriumSolver(const Mechanics& mechanics, SolveOptions options = {});
+
+  /// Deformed shape for a known undeformed one. Merit: energy (|r| for a law without energy).
+  /// @param X  undeformed nodes   @param x  out: equilibrium at full load, reached from x = X and no load
+  /// @param what  names the solve in messages, for example "supine"
+  /// @throws NumericalFailure  load fraction reached, worst element and place, what to change; x is then undefined
+  SolveReport forward(const Points& X, Points& x, const std::string& what);
+
+  /// Undeformed shape whose equilibrium under the load is the known deformed one (Govindjee and Mihalic 1996;
+  /// Mazier et al. 2022). Unknown X, matrix ∂r/∂X. Merit: |r|.
+  SolveReport inverse(const Points& x, Points& X, const std::string& what);
+
+ private:
+  enum class Unknown { deformed, undeformed };
+  struct Attempt {
+    bool converged = false;
+    int iterations = 0;
+    std::string reason;
+    double min_det_f = 1;
+    int min_cell = -1;
+    double residual_share = 0;
+  };
+  SolveReport step_load(Unknown unknown, const Points& known, Points& sought, const std::string& what);
+  Attempt newton(Unknown unknown, const Points& known, Points& sought, double load);
+  void evaluate(Unknown unknown, const Points& known, const Points& sought, double load);
+  bool direction(Unknown unknown, Eigen::VectorXd& step);
+
+  const Mechanics& mechanics_;
+  SolveOptions options_;
+  Sums sums_;
+  std::unique_ptr<CholeskySolver> cholesky_;
+  std::unique_ptr<LuSolver> lu_;
+  double weight_norm_ = 0;
+};
+
+}  // namespace supine::simulation

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "simulation/elements.h"
+#include "simulation/term.h"
+
+namespace supine::simulation {
+
+/// Weight of the tissue. With DensityReference::imaged the mass of each node comes from the imaged volume and stays;
+/// with undeformed it is ρ × undeformed volume and enters ∂r/∂X.
+template <class Element>
+class GravityTerm : public Term {
+ public:
+  /// @param imaged  prone nodes, mm
+  GravityTerm(const Indices& cells, const Pattern& pattern, const Points& imaged, DensityReference reference);
+
+  void set_fields(const Fields<double>& fields) override;
+  void add(const State& state, const Demand& demand, Sums& sums) const override;
+  void add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const override;
+
+ private:
+  void add_force(const State& state, const Eigen::Vector3d& weight, const Demand& demand, Sums& sums) const;
+
+  Elements elements_;
+  Points imaged_;
+  DensityReference reference_;
+  Eigen::Vector3d weight_ = Eigen::Vector3d::Zero();  // density × gravity, mN/mm³
+};
+
+extern template class GravityTerm<Tet4>;
+extern template class GravityTerm<Tet10>;
+
+}  // namespace supine::simulation

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/mechanics.h"
+
+#include "common/error.h"
+#include "simulation/bulk.h"
+#include "simulation/cut.h"
+#include "simulation/gravity.h"
+#include "simulation/interface.h"
+#include "simulation/skin.h"
+#include "simulation/tet_geometry.h"
+
+namespace supine::simulation {
+namespace {
+
+Indices rows_of(const Indices& table, const Eigen::VectorXi& rows) { return table(rows, Eigen::all); }
+
+SkinSettings skin_settings(const Model& model) {
+  SkinSettings settings;
+  settings.law = model.skin.law;
+  settings.compression = model.skin.compression;
+  settings.compression_share = model.skin.compression_share.value;
+  if (model.skin.poisson_ratio) settings.poisson_ratio = model.skin.poisson_ratio->value;
+  return settings;
+}
+
+template <class Cell, class Face>
+std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy,
+                                              const Model& model, const Layout& layout, const Pattern& pattern) {
+  std::vector<std::unique_ptr<Term>> terms;
+  terms.push_back(std::make_unique<BulkTerm<Cell>>(mesh.cells, pattern, model.breast.law));
+  terms.push_back(
+      std::make_unique<GravityTerm<Cell>>(mesh.cells, pattern, mesh.points, model.breast.density_refers_to));
+  if (model.skin.young_modulus_kpa.value > 0)
+    terms.push_back(
+        std::make_unique<SkinTerm<Face>>(rows_of(mesh.faces, layout.skin.faces), pattern, skin_settings(model)));
+  if (model.interface.kind == InterfaceKind::sliding)
+    terms.push_back(
+        std::make_unique<InterfaceTerm<Face>>(rows_of(mesh.faces, layout.interface.faces), pattern, anatomy.muscle));
+  if (model.cut.kind == CutKind::elastic)
+    terms.push_back(std::make_unique<CutTerm<Face>>(rows_of(mesh.faces, layout.cut.faces), pattern));
+  return terms;
+}
+
+template <class Element>
+Eigen::VectorXd det_f_of(const Indices& cells, const Points& x, const Points& X) {
+  Eigen::VectorXd smallest(cells.rows());
+  for (int c = 0; c < cells.rows(); ++c) {
+    const auto now = gather<Element::nodes>(x, cells, c), rest = gather<Element::nodes>(X, cells, c);
+    double least = 1e300;
+    for (int p = 0; p < Element::points; ++p) {
+      const auto point = tet_point<Element>(rest, p);
+      least = std::min(least, point.det > 0 ? (now.transpose() * point.b).determinant() : point.det);
+    }
+    smallest[c] = least;
+  }
+  return smallest;
+}
+
+}  // namespace
+
+Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model)
+    : mesh_(mesh), anatomy_(anatomy), layout_(make_layout(mesh, anatomy)), held_(mesh.points.rows(), 0) {
+  if (layout_.interface.faces.size() == 0)
+    throw InputError("the mesh has no inner faces: nothing lies on the muscle, so nothing holds the breast");
+  pattern_ = std::make_unique<Pattern>(mesh.cells, mesh.points.rows());
+  terms_ = mesh.order() == 2 ? make_terms<Tet10, Tri6>(mesh, anatomy, model, layout_, *pattern_)
+                             : make_terms<Tet4, Tri3>(mesh, anatomy, model, layout_, *pattern_);
+  const auto hold_group = [this, &mesh](const FaceGroup& group) {
+    for (const int face : group.faces)
+      for (const int node : mesh.faces.row(face)) held_[node] = 1;
+    any_held_ = true;
+  };
+  if (model.interface.kind == InterfaceKind::fixed) hold_group(layout_.interface);
+  if (model.cut.kind == CutKind::held) hold_group(layout_.cut);
+}
+
+bool Mechanics::has_energy() const {
+  for (const auto& term : terms_)
+    if (!term->has_energy()) return false;
+  return true;
+}
+
+void Mechanics::set_fields(const Fields<double>& fields) {
+  for (const auto& term : terms_) term->set_fields(fields);
+}
+
+void Mechanics::evaluate(const State& state, const Demand& demand, Sums& sums) const {
+  sums.clear(demand);
+  for (const auto& term : terms_) {
+    term->add(state, demand, sums);
+    if (!sums.valid) return;
+  }
+  if (any_held_) hold(demand, sums);
+}
+
+void Mechanics::parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const {
+  const Demand demand{.residual = true};
+  sums.clear(demand);
+  for (const auto& term : terms_) term->add_parameter_derivative(state, fields, sums);
+  if (any_held_) hold(demand, sums);
+}
+
+void Mechanics::hold(const Demand& demand, Sums& sums) const {
+  if (demand.residual)
+    for (std::size_t n = 0; n < held_.size(); ++n)
+      if (held_[n]) sums.residual.segment<3>(3 * static_cast<Eigen::Index>(n)).setZero();
+  const auto identity_rows = [this](SparseMatrix& matrix) {
+    for (int column = 0; column < matrix.outerSize(); ++column)
+      for (SparseMatrix::InnerIterator entry(matrix, column); entry; ++entry)
+        if (held_[column / 3] || held_[entry.row() / 3]) entry.valueRef() = entry.row() == column ? 1.0 : 0.0;
+  };
+  if (demand.tangent) identity_rows(sums.tangent);
+  if (demand.reference_tangent) identity_rows(sums.reference_tangent);
+}
+
+Eigen::VectorXd cell_det_f(const Indices& cells, const Points& x, const Points& X) {
+  return cells.cols() == 10 ? det_f_of<Tet10>(cells, x, X) : det_f_of<Tet4>(cells, x, X);
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "meshing/anatomy.h"
+#include "meshing/tet_mesh.h"
+#include "simulation/term.h"
+
+namespace supine::simulation {
+
+/// The terms of one model on one mesh, summed: r(x, X) and its derivatives.
+/// Nodes that the model holds (interface.kind = fixed, cut.kind = held) keep x = X = imaged place.
+class Mechanics {
+ public:
+  /// @param mesh, anatomy  of the imaged shape; must outlive the object
+  /// @throws InputError  a law that does not go with the mesh, no interface, no skin
+  Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model);
+
+  const Layout& layout() const { return layout_; }
+  const Pattern& pattern() const { return *pattern_; }
+  const meshing::TetMesh& mesh() const { return mesh_; }
+  const meshing::Anatomy& anatomy() const { return anatomy_; }
+  bool has_energy() const;
+  bool holds_nodes() const { return any_held_; }
+
+  /// Takes over material and loads of one pose.
+  void set_fields(const Fields<double>& fields);
+
+  /// Fills @p sums with what is demanded; rows and columns of held nodes become those of the identity.
+  void evaluate(const State& state, const Demand& demand, Sums& sums) const;
+
+  /// ∂r/∂p at frozen x and X, mN per unit of p; zero at held nodes.
+  void parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const;
+
+ private:
+  void hold(const Demand& demand, Sums& sums) const;
+
+  const meshing::TetMesh& mesh_;
+  const meshing::Anatomy& anatomy_;
+  Layout layout_;
+  std::unique_ptr<Pattern> pattern_;
+  std::vector<std::unique_ptr<Term>> terms_;
+  std::vector<char> held_;  // per node
+  bool any_held_ = false;
+};
+
+/// Smallest det F (F = ∂x/∂X) over the quadrature points of each cell; <= 0 where X or x is inverted.
+Eigen::VectorXd cell_det_f(const Indices& cells, const Points& x, const Points& X);
+
+}  // namespace supine::simulation

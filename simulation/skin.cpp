@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/skin.h"
+
+#include <ceres/jet.h>
+
+namespace supine::simulation {
+namespace {
+
+/// Symmetric 2-by-2 matrix: entries 11, 12, 22.
+template <class T>
+using Metric = Eigen::Matrix<T, 3, 1>;
+
+template <class T>
+T determinant(const Metric<T>& m) {
+  return m[0] * m[2] - m[1] * m[1];
+}
+
+Metric<double> metric(const Eigen::Matrix<double, 3, 2>& tangent) {
+  return {tangent.col(0).squaredNorm(), tangent.col(0).dot(tangent.col(1)), tangent.col(1).squaredNorm()};
+}
+
+/// Energy per parent area and the stress components T^{αβ} = 2 ∂e/∂g_αβ.
+template <class T>
+struct MembranePoint {
+  T energy;
+  Metric<T> stress;
+};
+
+template <class T>
+MembranePoint<T> membrane_point(const SkinSettings& settings, const Metric<T>& g, const Metric<T>& rest,
+                                const T& modulus, const T& prestretch) {
+  using std::sqrt;
+  const T det_g = determinant(g), det_rest = determinant(rest);
+  const T stretch2 = prestretch * prestretch;
+  // Adjugates: inverse times determinant.
+  const Metric<T> adj_rest(rest[2], -rest[1], rest[0]), adj_g(g[2], -g[1], g[0]);
+  const PlaneInvariants<T> c{stretch2 * (adj_rest[0] * g[0] + 2.0 * adj_rest[1] * g[1] + adj_rest[2] * g[2]) / det_rest,
+                             stretch2 * stretch2 * det_g / det_rest};
+  const SkinEnergy<T> psi = skin_energy(settings, c);
+  const T scale = modulus * sqrt(det_rest);
+  const T wa = scale * 2.0 * psi.psi_a * stretch2 / det_rest;
+  const T wb = scale * 2.0 * psi.psi_b * stretch2 * stretch2 / det_rest;
+  return {scale * psi.psi, wa * adj_rest + wb * adj_g};
+}
+
+/// r_a = w Σ_αβ ∂_αN_a T^{αβ} e_β.
+template <int N>
+Eigen::Matrix<double, N, 3> membrane_force(const Eigen::Matrix<double, N, 2>& gradient, const Metric<double>& t,
+                                           const Eigen::Matrix<double, 3, 2>& tangent, double weight) {
+  Eigen::Matrix2d stress;
+  stress << t[0], t[1], t[1], t[2];
+  return weight * gradient * stress * tangent.transpose();
+}
+
+/// ∂(g11, g12, g22)/∂(node a): 3 by 3, rows the metric's entries.
+template <int N>
+Eigen::Matrix3d metric_derivative(const Eigen::Matrix<double, N, 2>& gradient, int a,
+                                  const Eigen::Matrix<double, 3, 2>& tangent) {
+  Eigen::Matrix3d d;
+  d.row(0) = 2 * gradient(a, 0) * tangent.col(0).transpose();
+  d.row(1) = gradient(a, 0) * tangent.col(1).transpose() + gradient(a, 1) * tangent.col(0).transpose();
+  d.row(2) = 2 * gradient(a, 1) * tangent.col(1).transpose();
+  return d;
+}
+
+}  // namespace
+
+template <class Face>
+SkinTerm<Face>::SkinTerm(const Indices& faces, const Pattern& pattern, const SkinSettings& settings)
+    : elements_(faces, pattern), settings_(settings) {}
+
+template <class Face>
+void SkinTerm<Face>::set_fields(const Fields<double>& fields) {
+  modulus_ = fields.skin_modulus;
+  prestretch_ = fields.skin_prestretch;
+}
+
+template <class Face>
+void SkinTerm<Face>::add_face(int e, const State& state, const Demand& demand, Local<Face::nodes>& local) const {
+  constexpr int n = Face::nodes;
+  using Jet = ceres::Jet<double, 6>;
+  const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
+  for (int p = 0; p < Face::points; ++p) {
+    const auto& gradient = Face::table().gradient[p];
+    const double weight = Face::table().weight[p];
+    const Eigen::Matrix<double, 3, 2> now = x.transpose() * gradient, before = rest.transpose() * gradient;
+    const Metric<double> g = metric(now), rest_g = metric(before);
+    if (!demand.tangent && !demand.reference_tangent) {
+      const auto point = membrane_point<double>(settings_, g, rest_g, modulus_[e], prestretch_[e]);
+      local.energy += weight * point.energy;
+      const auto force = membrane_force<n>(gradient, point.stress, now, weight);
+      for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += force.row(a).transpose();
+      continue;
+    }
+    Metric<Jet> gj, rest_j;
+    for (int i = 0; i < 3; ++i) {
+      gj[i] = Jet(g[i], i);
+      rest_j[i] = Jet(rest_g[i], 3 + i);
+    }
+    const auto point = membrane_point<Jet>(settings_, gj, rest_j, Jet(modulus_[e]), Jet(prestretch_[e]));
+    Metric<double> stress;
+    Eigen::Matrix3d by_g, by_rest;  // ∂T/∂g and ∂T/∂G
+    for (int i = 0; i < 3; ++i) {
+      stress[i] = point.stress[i].a;
+      by_g.row(i) = point.stress[i].v.template head<3>().transpose();
+      by_rest.row(i) = point.stress[i].v.template tail<3>().transpose();
+    }
+    local.energy += weight * point.energy.a;
+    const auto force = membrane_force<n>(gradient, stress, now, weight);
+    Eigen::Matrix2d stress_matrix;
+    stress_matrix << stress[0], stress[1], stress[1], stress[2];
+    const Eigen::Matrix<double, n, n> geometric = weight * gradient * stress_matrix * gradient.transpose();
+    for (int a = 0; a < n; ++a) {
+      local.residual.template segment<3>(3 * a) += force.row(a).transpose();
+      // ½ because T^{αβ} = 2 ∂e/∂g_αβ with the off-diagonal entry standing for two.
+      const Eigen::Matrix3d left = 0.5 * weight * metric_derivative<n>(gradient, a, now).transpose();
+      const Eigen::Vector3d twice(1, 2, 1);
+      const Eigen::Matrix3d to_x = left * twice.asDiagonal() * by_g, to_rest = left * twice.asDiagonal() * by_rest;
+      for (int b = 0; b < n; ++b) {
+        auto block = local.tangent.template block<3, 3>(3 * a, 3 * b);
+        block.noalias() += to_x * metric_derivative<n>(gradient, b, now);
+        block.diagonal().array() += geometric(a, b);
+        if (demand.reference_tangent)
+          local.reference_tangent.template block<3, 3>(3 * a, 3 * b).noalias() +=
+              to_rest * metric_derivative<n>(gradient, b, before);
+      }
+    }
+  }
+}
+
+template <class Face>
+void SkinTerm<Face>::add(const State& state, const Demand& demand, Sums& sums) const {
+  add_elements<Face::nodes>(elements_, demand, sums,
+                            [this, &state, &demand](int e, auto& local) { add_face(e, state, demand, local); });
+}
+
+template <class Face>
+void SkinTerm<Face>::add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const {
+  constexpr int n = Face::nodes;
+  add_elements<n>(elements_, Demand{.residual = true}, sums, [this, &state, &fields](int e, auto& local) {
+    const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
+    for (int p = 0; p < Face::points; ++p) {
+      const auto& gradient = Face::table().gradient[p];
+      const Eigen::Matrix<double, 3, 2> now = x.transpose() * gradient, before = rest.transpose() * gradient;
+      const Metric<Dual> g = metric(now).template cast<Dual>(), rest_g = metric(before).template cast<Dual>();
+      const auto point = membrane_point<Dual>(settings_, g, rest_g, fields.skin_modulus[e], fields.skin_prestretch[e]);
+      const Metric<double> derivative(point.stress[0].v[0], point.stress[1].v[0], point.stress[2].v[0]);
+      const auto force = membrane_force<n>(gradient, derivative, now, Face::table().weight[p]);
+      for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += force.row(a).transpose();
+    }
+  });
+}
+
+template class SkinTerm<Tri3>;
+template class SkinTerm<Tri6>;
+
+}  // namespace supine::simulation

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "simulation/elements.h"
+#include "simulation/skin_laws.h"
+#include "simulation/term.h"
+
+namespace supine::simulation {
+
+/// Massless elastic membrane on the skin faces, without bending stiffness: energy ∫ E h ψ(Cs) dA over the undeformed
+/// area, Cs the in-plane Cauchy-Green tensor times prestretch². With metrics G (undeformed) and g (deformed) of the
+/// parent coordinates, λ1² + λ2² = tr(G⁻¹ g) and λ1² λ2² = det g / det G, so that x and X play alike roles.
+/// @tparam Face  Tri3 or Tri6
+template <class Face>
+class SkinTerm : public Term {
+ public:
+  SkinTerm(const Indices& faces, const Pattern& pattern, const SkinSettings& settings);
+
+  void set_fields(const Fields<double>& fields) override;
+  void add(const State& state, const Demand& demand, Sums& sums) const override;
+  void add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const override;
+
+ private:
+  void add_face(int e, const State& state, const Demand& demand, Local<Face::nodes>& local) const;
+
+  Elements elements_;
+  SkinSettings settings_;
+  Eigen::VectorXd modulus_, prestretch_;  // per face: kPa mm, 1
+};
+
+extern template class SkinTerm<Tri3>;
+extern template class SkinTerm<Tri6>;
+
+}  // namespace supine::simulation

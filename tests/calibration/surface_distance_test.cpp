@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "calibration/surface_distance.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cstring>
+#include <limits>
+
+#include "calibration/closest_point.h"
+#include "common/error.h"
+#include "tests/calibration/shapes.h"
+
+namespace supine::calibration {
+namespace {
+
+template <class Matrix>
+bool same_bytes(const Matrix& a, const Matrix& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(*a.data())) == 0;
+}
+
+double brute_force_mm(const reconstruction::Surface& surface, const Eigen::Vector3d& query) {
+  double best = std::numeric_limits<double>::infinity();
+  for (const auto& t : surface.triangles.rowwise()) {
+    const Eigen::Vector3d a = surface.points.row(t[0]), b = surface.points.row(t[1]), c = surface.points.row(t[2]);
+    const Eigen::Vector3d w = closest_on_triangle(query, a, b, c).weight;
+    best = std::min(best, (w[0] * a + w[1] * b + w[2] * c - query).norm());
+  }
+  return best;
+}
+
+}  // namespace
+
+TEST(SurfaceDistance, AgreesWithBruteForce) {
+  const auto ball = testing::sphere(10, 2);
+  const Points queries = testing::random_points(300, -15, 15, 3);
+  ClosestPoints closest;
+  SurfaceDistance(ball.points, ball.triangles).closest(queries, closest);
+  for (int i = 0; i < queries.rows(); ++i) {
+    ASSERT_NEAR(closest.distance_mm[i], brute_force_mm(ball, queries.row(i)), 1e-12);
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    for (int k = 0; k < 3; ++k) sum += closest.weight(i, k) * ball.points.row(closest.node(i, k));
+    ASSERT_TRUE(sum.isApprox(closest.point.row(i), 1e-14));
+    ASSERT_EQ(closest.node.row(i), ball.triangles.row(closest.triangle[i]));
+  }
+}
+
+TEST(SurfaceDistance, NamesTheLowestTriangleAndThePseudoNormalOfSharedFeatures) {
+  // A roof of two faces over the edge x = 0; their normals are (±1, 0, 1)/√2.
+  Points points(4, 3);
+  points << 0, 0, 0, 0, 4, 0, -3, 2, -3, 3, 2, -3;
+  Triangles triangles(2, 3);
+  triangles << 0, 1, 2, 1, 0, 3;
+  const SurfaceDistance roof(points, triangles);
+  Points queries(3, 3);
+  queries << 0.2, 2, 5, 0, -1, 1, 2, 2, 0;
+  ClosestPoints closest;
+  roof.closest(queries, closest);
+  EXPECT_EQ(closest.triangle[0], 0);
+  EXPECT_TRUE(closest.weight.row(0).isApprox(Eigen::RowVector3d(0.5, 0.5, 0)));
+  EXPECT_TRUE(closest.normal.row(0).isApprox(Eigen::RowVector3d(0, 0, 1)));
+  EXPECT_FALSE(closest.on_border[0]);
+  EXPECT_EQ(closest.triangle[1], 0);
+  EXPECT_TRUE(closest.on_border[1]);
+  EXPECT_EQ(closest.triangle[2], 1);
+  EXPECT_FALSE(closest.on_border[2]);
+  EXPECT_TRUE(closest.normal.row(2).isApprox(Eigen::RowVector3d(1, 0, 1).normalized()));
+}
+
+TEST(SurfaceDistance, ThreadsDoNotChangeABit) {
+  const auto ball = testing::sphere(10, 3);
+  const Points queries = testing::random_points(2000, -15, 15, 4);
+  const SurfaceDistance triangles(ball.points, ball.triangles), cloud(ball.points, Triangles(0, 3));
+  for (const auto* index : {&triangles, &cloud}) {
+    ClosestPoints one, two;
+    omp_set_num_threads(1);
+    index->closest(queries, one);
+    omp_set_num_threads(2);
+    index->closest(queries, two);
+    EXPECT_TRUE(same_bytes(one.point, two.point) && same_bytes(one.distance_mm, two.distance_mm) &&
+                same_bytes(one.triangle, two.triangle) && same_bytes(one.weight, two.weight) &&
+                same_bytes(one.normal, two.normal) && same_bytes(one.on_border, two.on_border));
+  }
+}
+
+TEST(SurfaceDistance, OrderOfQueriesAndOfTrianglesDoesNotMatter) {
+  const auto ball = testing::sphere(10, 2);
+  const Points queries = testing::random_points(100, -15, 15, 5);
+  ClosestPoints closest, backward;
+  SurfaceDistance(ball.points, ball.triangles).closest(queries, closest);
+  SurfaceDistance(ball.points, ball.triangles.colwise().reverse()).closest(queries.colwise().reverse(), backward);
+  EXPECT_TRUE(closest.distance_mm.isApprox(backward.distance_mm.reverse(), 1e-14));
+  EXPECT_TRUE(closest.point.isApprox(backward.point.colwise().reverse(), 1e-14));
+}
+
+TEST(SurfaceDistance, MovedEqualsBuiltAnew) {
+  const auto ball = testing::sphere(10, 2);
+  const Points moved = ball.points * 1.3;
+  const Points queries = testing::random_points(100, -15, 15, 6);
+  SurfaceDistance index(ball.points, ball.triangles);
+  index.move(moved);
+  ClosestPoints closest, anew;
+  index.closest(queries, closest);
+  SurfaceDistance(moved, ball.triangles).closest(queries, anew);
+  EXPECT_TRUE(same_bytes(closest.point, anew.point) && same_bytes(closest.normal, anew.normal));
+}
+
+TEST(SurfaceDistance, ScalesWithTheSurface) {
+  const auto ball = testing::sphere(10, 2);
+  const Points queries = testing::random_points(100, -15, 15, 7);
+  ClosestPoints closest, scaled;
+  SurfaceDistance(ball.points, ball.triangles).closest(queries, closest);
+  for (const double factor : {1e-3, 1e3}) {
+    SurfaceDistance(ball.points * factor, ball.triangles).closest(queries * factor, scaled);
+    EXPECT_TRUE(scaled.distance_mm.isApprox(closest.distance_mm * factor, 1e-12));
+  }
+}
+
+TEST(SurfaceDistance, SkipsTrianglesWithoutAreaAndKeepsTheirNeighbours) {
+  Points points(5, 3);
+  points << 0, 0, 0, 4, 0, 0, 4, 4, 0, 0, 4, 0, 2, 2, 0;
+  Triangles triangles(4, 3);
+  triangles << 0, 1, 4, 1, 2, 4, 0, 4, 2, 0, 2, 3;  // the third is flat on the diagonal
+  ClosestPoints closest;
+  SurfaceDistance(points, triangles).closest(Points(Eigen::RowVector3d(1, 1.0, 3)), closest);
+  EXPECT_NEAR(closest.distance_mm[0], 3, 1e-14);
+  EXPECT_FALSE(closest.on_border[0]);
+}
+
+TEST(PointCloudDistance, ExactOnAPlaneAndBorderBySpacing) {
+  const auto flat = testing::sheet(0, 40, 20);  // spacing 2
+  Points queries(4, 3);
+  queries << 13.3, 17.1, 5, 20, 21, -7, 43, 20, 1, 47, 20, 1;
+  ClosestPoints closest;
+  SurfaceDistance(flat.points, Triangles(0, 3)).closest(queries, closest);
+  EXPECT_NEAR(closest.distance_mm[0], 5, 1e-12);
+  EXPECT_NEAR(closest.distance_mm[1], 7, 1e-12);
+  EXPECT_NEAR(closest.distance_mm[2], 1, 1e-12);
+  EXPECT_NEAR(closest.distance_mm[3], std::hypot(7, 1), 1e-12);
+  EXPECT_FALSE(closest.on_border[0] || closest.on_border[1] || closest.on_border[2]);
+  EXPECT_TRUE(closest.on_border[3]);
+}
+
+TEST(PointCloudDistance, SphereErrorFallsFasterThanTheSquareOfTheSpacing) {
+  Points queries = testing::random_points(200, -1, 1, 8);
+  queries.rowwise().normalize();
+  queries *= 53;
+  double previous = 0;
+  for (const int splits : {2, 3, 4}) {
+    ClosestPoints closest;
+    SurfaceDistance(testing::sphere(50, splits).points, Triangles(0, 3)).closest(queries, closest);
+    const double error = (closest.distance_mm.array() - 3).abs().mean();
+    if (previous > 0) {
+      EXPECT_GT(std::log2(previous / error) + 0.1, 2);
+    }
+    previous = error;
+  }
+  EXPECT_LT(previous, 0.02);  // spacing 3.7 mm
+}
+
+TEST(SurfaceDistance, RefusesBadSurfaces) {
+  const auto ball = testing::sphere(10, 1);
+  EXPECT_THROW(SurfaceDistance(ball.points, ball.triangles.array() + 1), InputError);
+  EXPECT_THROW(SurfaceDistance(ball.points * std::nan(""), ball.triangles), InputError);
+  EXPECT_THROW(SurfaceDistance(ball.points * 0, ball.triangles), InputError);
+  EXPECT_THROW(SurfaceDistance(ball.points.topRows(18), Triangles(0, 3)), InputError);
+}
+
+}  // namespace supine::calibration

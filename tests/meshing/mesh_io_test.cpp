@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "meshing/mesh_io.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "common/error.h"
+#include "meshing/topology.h"
+#include "tests/support/shapes.h"
+
+namespace supine {
+namespace {
+
+class MeshFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::temp_directory_path() / (std::string("supine_mesh_io_") + info->name());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  static std::string bytes(const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
+  static meshing::TetMesh mixed_mesh() {
+    meshing::TetMesh mesh = testing::dome_mesh({.rings = 3, .layers = 2, .muscle_rings = 5});
+    mesh.fraction(0, 1) = 0.25;
+    mesh.fraction(0, 2) = 0.75;
+    mesh.tissue[0] = 2;
+    mesh.region[0] = 3;
+    return mesh;
+  }
+
+  std::filesystem::path folder_;
+};
+
+void expect_same(const meshing::TetMesh& a, const meshing::TetMesh& b) {
+  EXPECT_EQ(a.points, b.points);
+  EXPECT_EQ(a.cells, b.cells);
+  EXPECT_EQ(a.tissue, b.tissue);
+  EXPECT_EQ(a.fraction, b.fraction);
+  EXPECT_EQ(a.faces, b.faces);
+  EXPECT_EQ(a.region, b.region);
+  EXPECT_EQ(a.face_cell, b.face_cell);
+  EXPECT_EQ(a.muscle.points, b.muscle.points);
+  EXPECT_EQ(a.muscle.triangles, b.muscle.triangles);
+}
+
+TEST_F(MeshFile, LinearMeshComesBackExactly) {
+  const meshing::TetMesh mesh = mixed_mesh();
+  meshing::write_mesh(mesh, folder_ / "mesh.vtu", "right");
+  expect_same(meshing::read_mesh(folder_ / "mesh.vtu"), mesh);
+  EXPECT_EQ(meshing::read_side(folder_ / "mesh.vtu"), "right");
+}
+
+TEST_F(MeshFile, QuadraticMeshComesBackExactly) {
+  const meshing::TetMesh mesh = meshing::to_quadratic(mixed_mesh());
+  meshing::write_mesh(mesh, folder_ / "mesh.vtu");
+  expect_same(meshing::read_mesh(folder_ / "mesh.vtu"), mesh);
+  EXPECT_EQ(meshing::read_side(folder_ / "mesh.vtu"), "");
+}
+
+TEST_F(MeshFile, SameMeshSameBytes) {
+  meshing::write_mesh(mixed_mesh(), folder_ / "a.vtu");
+  meshing::write_mesh(mixed_mesh(), folder_ / "b.vtu");
+  EXPECT_EQ(bytes(folder_ / "a.vtu"), bytes(folder_ / "b.vtu"));
+}
+
+TEST_F(MeshFile, PoseGivesBackProneAndPositions) {
+  const meshing::TetMesh mesh = mixed_mesh();
+  Points moved = mesh.points;
+  moved.array() *= 1.125;
+  const Table pressure = Table::Constant(mesh.cells.rows(), 1, 2.5);
+  const Table force = Table::Random(mesh.points.rows(), 3);
+  meshing::write_pose(mesh, moved, {{"force_mn", force}}, {{"pressure_kpa", pressure}}, folder_ / "supine.vtu");
+  const meshing::PoseMesh pose = meshing::read_pose(folder_ / "supine.vtu");
+  EXPECT_EQ(pose.positions, moved);
+  EXPECT_LT((pose.mesh.points - mesh.points).cwiseAbs().maxCoeff(), 1e-12 * 100);
+  EXPECT_EQ(pose.mesh.region, mesh.region);
+  ASSERT_EQ(pose.point_arrays.size(), 1u);
+  EXPECT_EQ(pose.point_arrays[0].first, "force_mn");
+  EXPECT_EQ(pose.point_arrays[0].second, force);
+}
+
+TEST_F(MeshFile, PoseArraysMustFitTheMesh) {
+  const meshing::TetMesh mesh = mixed_mesh();
+  EXPECT_THROW(meshing::write_pose(mesh, mesh.points.topRows(3), {}, {}, folder_ / "x.vtu"), InputError);
+  EXPECT_THROW(meshing::write_pose(mesh, mesh.points, {{"a", Table(2, 1)}}, {}, folder_ / "x.vtu"), InputError);
+  EXPECT_THROW(meshing::write_pose(mesh, mesh.points, {}, {{"a", Table(2, 1)}}, folder_ / "x.vtu"), InputError);
+}
+
+TEST_F(MeshFile, RefusesAMissingFile) { EXPECT_THROW(meshing::read_mesh(folder_ / "none.vtu"), InputError); }
+
+TEST_F(MeshFile, RefusesACutOffFile) {
+  meshing::write_mesh(mixed_mesh(), folder_ / "mesh.vtu");
+  std::filesystem::resize_file(folder_ / "mesh.vtu", std::filesystem::file_size(folder_ / "mesh.vtu") / 2);
+  EXPECT_THROW(meshing::read_mesh(folder_ / "mesh.vtu"), InputError);
+}
+
+TEST_F(MeshFile, RefusesAPoseWithoutDisplacement) {
+  meshing::write_mesh(mixed_mesh(), folder_ / "mesh.vtu");
+  EXPECT_THROW(meshing::read_pose(folder_ / "mesh.vtu"), InputError);
+}
+
+TEST_F(MeshFile, RefusesAnInvertedTetrahedronNamingTheFile) {
+  meshing::TetMesh mesh = mixed_mesh();
+  std::swap(mesh.cells(5, 0), mesh.cells(5, 1));
+  meshing::write_mesh(mesh, folder_ / "mesh.vtu");
+  try {
+    meshing::read_mesh(folder_ / "mesh.vtu");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("mesh.vtu: tetrahedron 5"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(MeshFile, RefusesAFolderItCannotWriteTo) {
+  EXPECT_THROW(meshing::write_mesh(mixed_mesh(), folder_ / "none" / "mesh.vtu"), InputError);
+}
+
+}  // namespace
+}  // namespace supine

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/catalogue.h"
+
+#include <gtest/gtest.h>
+
+#include "common/error.h"
+#include "simulation/mechanics.h"
+#include "tests/simulation/scene.h"
+#include "tests/support/taylor.h"
+
+namespace supine::simulation {
+namespace {
+
+Eigen::VectorXd all_numbers(const Fields<double>& f) {
+  std::vector<double> numbers;
+  for (const auto* column : {&f.ln_young, &f.poisson, &f.stiffening, &f.skin_modulus, &f.skin_prestretch,
+                             &f.interface_normal, &f.interface_tangential, &f.cut_stiffness})
+    numbers.insert(numbers.end(), column->begin(), column->end());
+  for (int i = 0; i < 3; ++i) numbers.push_back(f.gravity[i]);
+  numbers.push_back(f.density);
+  return Eigen::Map<Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+}
+
+class CatalogueTest : public ::testing::TestWithParam<const Effect*> {
+ protected:
+  CatalogueTest() : scene(testing::dome_scene()), layout(make_layout(scene.mesh, scene.anatomy)) {
+    // Half gland, half fat, a little tumour: every tissue effect has something to act on.
+    scene.mesh.fraction.setZero();
+    for (Eigen::Index c = 0; c < scene.mesh.cells.rows(); ++c) {
+      scene.mesh.fraction(c, static_cast<int>(segmentation::Tissue::adipose)) = 0.5;
+      scene.mesh.fraction(c, static_cast<int>(segmentation::Tissue::gland)) = 0.4;
+      scene.mesh.fraction(c, static_cast<int>(segmentation::Tissue::tumour)) = 0.1;
+    }
+  }
+  Fields<Dual> with(const std::vector<Dual>& values, const std::string& pose = "supine") const {
+    const Scene place{scene.mesh, scene.anatomy, layout, pose};
+    Fields<Dual> fields = make_fields(model, place, {0.1, 0.9, 0.4});
+    std::map<std::string, std::string> options;
+    for (const OptionRow& row : GetParam()->options()) options[row.name] = row.default_value;
+    if (!values.empty()) GetParam()->apply(place, values, options, fields);
+    return fields;
+  }
+  testing::TestScene scene;
+  Layout layout;
+  Model model = testing::soft_model();
+};
+
+TEST_P(CatalogueTest, NullValuesLeaveEveryFieldBitForBit) {
+  std::vector<Dual> null;
+  for (const Parameter& row : GetParam()->parameters()) null.emplace_back(row.null);
+  for (const char* pose : {"prone", "supine"})
+    EXPECT_EQ(all_numbers(values_of(with(null, pose))), all_numbers(values_of(with({}, pose))));
+}
+
+TEST_P(CatalogueTest, EveryParameterHasTheDerivativeItStates) {
+  const auto& rows = GetParam()->parameters();
+  for (std::size_t p = 0; p < rows.size(); ++p) {
+    const auto at = [&](const Dual& h) {
+      std::vector<Dual> values;
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const double place = rows[i].one_sided ? rows[i].median : rows[i].null + 0.23 * (rows[i].upper - rows[i].null);
+        values.push_back(Dual(place) + (i == p ? h : Dual(0.0)));
+      }
+      return with(values);
+    };
+    const auto moving = at(Dual(0.0, 0));
+    Fields<double> slope = values_of(moving);  // same shapes; overwritten by the derivatives
+    const auto derivative = [](const Fields<Dual>::Column& from, Eigen::VectorXd& to) {
+      for (Eigen::Index i = 0; i < from.size(); ++i) to[i] = from[i].v[0];
+    };
+    derivative(moving.ln_young, slope.ln_young);
+    derivative(moving.poisson, slope.poisson);
+    derivative(moving.stiffening, slope.stiffening);
+    derivative(moving.skin_modulus, slope.skin_modulus);
+    derivative(moving.skin_prestretch, slope.skin_prestretch);
+    derivative(moving.interface_normal, slope.interface_normal);
+    derivative(moving.interface_tangential, slope.interface_tangential);
+    derivative(moving.cut_stiffness, slope.cut_stiffness);
+    for (int i = 0; i < 3; ++i) slope.gravity[i] = moving.gravity[i].v[0];
+    slope.density = moving.density.v[0];
+
+    const Eigen::VectorXd tangent = all_numbers(slope);
+    ASSERT_GT(tangent.norm(), 1e-9) << rows[p].name << " changes nothing";
+    const double h = 1e-5;
+    const Eigen::VectorXd difference =
+        (all_numbers(values_of(at(Dual(h)))) - all_numbers(values_of(at(Dual(-h))))) / (2 * h);
+    EXPECT_LT((difference - tangent).norm(), 1e-4 * tangent.norm()) << rows[p].name;
+  }
+}
+
+TEST_P(CatalogueTest, RowsAreConsistent) {
+  for (const Parameter& row : GetParam()->parameters()) {
+    EXPECT_LT(row.lower, row.upper) << row.name;
+    EXPECT_GE(row.null, row.lower) << row.name;
+    EXPECT_LE(row.null, row.upper) << row.name;
+    EXPECT_FALSE(row.unit.empty()) << row.name;
+    EXPECT_FALSE(row.meaning.empty()) << row.name;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Effects, CatalogueTest, ::testing::ValuesIn(catalogue()),
+                         [](const auto& info) { return info.param->name(); });
+
+TEST(Catalogue, NamesAreUniqueAndFound) {
+  for (const Effect* effect : catalogue()) EXPECT_EQ(find_effect(effect->name()), effect);
+  EXPECT_EQ(find_effect("ligamnet"), nullptr);
+}
+
+TEST(Ligament, ActsOnTheFootAlone) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  Model model = testing::soft_model();
+  model.effects.push_back({"ligament", {{"stiffness_kpa_per_mm", Setting{0.5}}, {"width_mm", Setting{12}}}, {}});
+  const auto fields = values_of(make_fields(model, {scene.mesh, scene.anatomy, layout, "supine"}, {0, 1, 0}));
+  double inside = 0;
+  for (Eigen::Index p = 0; p < layout.interface.q.rows(); ++p) {
+    const double distance = std::abs(scene.anatomy.from_foot_mm(layout.interface.q.row(p).transpose()));
+    const double added = fields.interface_normal[p] - model.interface.normal_kpa_per_mm.value;
+    if (distance < 3.9) EXPECT_NEAR(added, 0.5, 1e-12);
+    if (distance > 8.1) EXPECT_EQ(added, 0);
+    inside += added > 0;
+  }
+  EXPECT_GT(inside, 10);
+}
+
+TEST(Ligament, RigidTieReproducesTheStudysCompliance) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  Model model = testing::soft_model();
+  model.effects.push_back({"ligament", {}, {{"tie", "rigid"}}});
+  const auto fields = values_of(make_fields(model, {scene.mesh, scene.anatomy, layout, "supine"}, {0, 1, 0}));
+  const Eigen::VectorXd added = fields.interface_normal.array() - model.interface.normal_kpa_per_mm.value;
+  // Total stiffness over the ring in mN/mm, against 1e8 for each of its some dozen nodes.
+  const double total = added.dot(layout.interface.area_mm2);
+  EXPECT_GT(total, 1e8 * 10);
+  EXPECT_LT(total, 1e8 * static_cast<double>(scene.mesh.points.rows()));
+}
+
+TEST(MakeFields, UnknownEffectIsRefused) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  Model model = testing::soft_model();
+  model.effects.push_back({"ligamnet", {}, {}});
+  EXPECT_THROW(make_fields(model, {scene.mesh, scene.anatomy, layout, "supine"}, {0, 1, 0}), InputError);
+}
+
+}  // namespace
+}  // namespace supine::simulation

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/skin_laws.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/taylor.h"
+
+namespace supine::simulation {
+namespace {
+
+using testing::taylor_order;
+
+PlaneInvariants<double> of_stretches(double l1, double l2) { return {l1 * l1 + l2 * l2, l1 * l1 * l2 * l2}; }
+
+SkinSettings settings(SkinLaw law, Compression compression, double share = 0.05) {
+  return {law, compression, share, 0.45};
+}
+
+class SkinLawTest : public ::testing::TestWithParam<SkinLaw> {};
+
+// taut, wrinkled, slack
+const std::vector<std::pair<double, double>> places = {{1.3, 1.1}, {1.3, 0.7}, {0.9, 0.8}};
+
+TEST_P(SkinLawTest, DerivativesFollowTheEnergyInEveryRegime) {
+  for (const Compression compression : {Compression::tension_field, Compression::full})
+    for (const auto& [l1, l2] : places) {
+      const auto c = of_stretches(l1, l2);
+      const auto s = settings(GetParam(), compression);
+      const auto e = skin_energy<double>(s, c);
+      EXPECT_GT(taylor_order(
+                    [&](double h) {
+                      return skin_energy<double>(s, {c.a + h, c.b - 0.7 * h}).psi;
+                    },
+                    e.psi_a - 0.7 * e.psi_b),
+                1.9)
+          << l1 << " " << l2;
+    }
+}
+
+TEST_P(SkinLawTest, RelaxedEnergyAndStressAreContinuousAcrossTheBorders) {
+  const auto s = settings(GetParam(), Compression::tension_field, 0.0);
+  const double natural = GetParam() == SkinLaw::neo_hookean ? 1 / std::sqrt(1.3) : 1 - 0.45 * 0.3;
+  for (const auto& [l1, l2] : std::vector<std::pair<double, double>>{{1.3, natural}, {1.0, 0.8}}) {
+    const bool along_first = l1 == 1.0;
+    const auto at = [&](double d) {
+      return skin_energy<double>(s, along_first ? of_stretches(l1 + d, l2) : of_stretches(l1, l2 + d));
+    };
+    const auto below = at(-1e-7), above = at(1e-7);
+    EXPECT_NEAR(below.psi, above.psi, 1e-6);
+    EXPECT_NEAR(below.psi_a, above.psi_a, 1e-6);
+    EXPECT_NEAR(below.psi_b, above.psi_b, 1e-6);
+  }
+}
+
+TEST_P(SkinLawTest, RelaxedNeverExceedsFullAndAgreesWhereTaut) {
+  for (double l1 = 0.6; l1 < 1.6; l1 += 0.07)
+    for (double l2 = 0.5; l2 <= l1; l2 += 0.07) {
+      const auto c = of_stretches(l1, l2);
+      const double full = skin_energy<double>(settings(GetParam(), Compression::full), c).psi;
+      const double relaxed = skin_energy<double>(settings(GetParam(), Compression::tension_field, 0), c).psi;
+      EXPECT_LE(relaxed, full + 1e-12);
+      EXPECT_GE(relaxed, 0);
+      if (l2 >= 1) EXPECT_NEAR(relaxed, full, 1e-12);
+    }
+}
+
+TEST_P(SkinLawTest, UniaxialTensionGivesYoungsModulus) {
+  // A free narrow strip: stress along it over strain is E, because the second stretch takes its natural width.
+  const auto s = settings(GetParam(), Compression::tension_field, 0.0);
+  const double strain = 1e-4;
+  const double energy = skin_energy<double>(s, of_stretches(1 + strain, 0.9)).psi;
+  EXPECT_NEAR(energy, 0.5 * strain * strain, 2e-3 * 0.5 * strain * strain);
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, SkinLawTest, ::testing::Values(SkinLaw::neo_hookean, SkinLaw::corotational));
+
+}  // namespace
+}  // namespace supine::simulation

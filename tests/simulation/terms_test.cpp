@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <gtest/gtest.h>
+
+#include <Eigen/SparseCore>
+
+#include "simulation/mechanics.h"
+#include "tests/simulation/scene.h"
+#include "tests/support/taylor.h"
+
+namespace supine::simulation {
+namespace {
+
+using testing::random_matrix;
+using testing::taylor_order;
+
+struct Case {
+  int order;
+  BulkLaw law;
+  SkinLaw skin;
+  Compression compression;
+  DensityReference density;
+};
+
+// All terms at once on a small box, away from equilibrium, with x and X both moved from the imaged shape.
+class TermsTest : public ::testing::TestWithParam<Case> {
+ protected:
+  TermsTest() {
+    scene = testing::box_scene(2, {60, 50, 40});
+    if (GetParam().order == 2) scene.mesh = testing::quadratic(scene.mesh);
+    if (GetParam().order == 2) {
+      auto& a = scene.anatomy;
+      const auto n = scene.mesh.points.rows();
+      a.q.resize(n, 2);
+      for (Eigen::Index p = 0; p < n; ++p)
+        a.q.row(p) = (scene.mesh.points.row(p).transpose() - a.foot_centre_mm).head<2>().transpose() / a.foot_radius_mm;
+    }
+    model = testing::soft_model(GetParam().law, GetParam().skin);
+    model.skin.compression = GetParam().compression;
+    model.breast.density_refers_to = GetParam().density;
+    model.interface.tangential_kpa_per_mm.value = 0.2;
+    mechanics = std::make_unique<Mechanics>(scene.mesh, scene.anatomy, model);
+    fields = make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics->layout(), "prone"}, {0.3, -0.2, 0.9});
+    for (Dual& b : fields.stiffening) b += 0.3;
+    for (Dual& p : fields.skin_prestretch) p += 0.05;
+    mechanics->set_fields(values_of(fields));
+    sums = std::make_unique<Sums>(mechanics->pattern());
+    const int n = static_cast<int>(scene.mesh.points.rows());
+    X = scene.mesh.points + 1.5 * random_matrix(n, 3, 1);
+    x = X + 2.0 * random_matrix(n, 3, 2);
+    x.col(2) *= 1.15;
+    x.col(0) *= 0.9;
+    v = random_matrix(n, 3, 3);
+  }
+
+  double energy(const Points& now, const Points& rest) {
+    mechanics->evaluate({now, rest}, Demand{.energy = true}, *sums);
+    return sums->energy;
+  }
+  Eigen::VectorXd residual(const Points& now, const Points& rest) {
+    mechanics->evaluate({now, rest}, Demand{.residual = true}, *sums);
+    EXPECT_TRUE(sums->valid);
+    return sums->residual;
+  }
+  Eigen::VectorXd flat_direction() const { return Eigen::Map<const Eigen::VectorXd>(v.data(), v.size()); }
+
+  testing::TestScene scene;
+  Model model;
+  std::unique_ptr<Mechanics> mechanics;
+  Fields<Dual> fields;
+  std::unique_ptr<Sums> sums;
+  Points X, x, v;
+};
+
+TEST_P(TermsTest, ResidualIsTheDerivativeOfTheEnergy) {
+  if (!mechanics->has_energy()) return;
+  const double slope = residual(x, X).dot(flat_direction());
+  ASSERT_GT(std::abs(slope), 1e-3);
+  EXPECT_GT(taylor_order([&](double h) { return energy(x + h * v, X); }, slope), 1.9);
+}
+
+TEST_P(TermsTest, TangentIsTheDerivativeWithRespectToTheDeformedShape) {
+  mechanics->evaluate({x, X}, Demand{.residual = true, .tangent = true}, *sums);
+  const Eigen::VectorXd slope = sums->tangent * flat_direction();
+  ASSERT_GT(slope.norm(), 1e-3);
+  EXPECT_GT(taylor_order([&](double h) { return residual(x + h * v, X); }, slope), 1.9);
+}
+
+TEST_P(TermsTest, ReferenceTangentIsTheDerivativeWithRespectToTheUndeformedShape) {
+  mechanics->evaluate({x, X}, Demand{.residual = true, .reference_tangent = true}, *sums);
+  const Eigen::VectorXd slope = sums->reference_tangent * flat_direction();
+  ASSERT_GT(slope.norm(), 1e-3);
+  EXPECT_GT(taylor_order([&](double h) { return residual(x, X + h * v); }, slope), 1.9);
+}
+
+TEST_P(TermsTest, EveryFieldHasItsDerivative) {
+  // Each field alone moves along a random direction with a curvature, so that the remainder is of second order.
+  using Column = Fields<Dual>::Column;
+  const std::vector<std::pair<const char*, Column Fields<Dual>::*>> columns = {
+      {"ln_young", &Fields<Dual>::ln_young},
+      {"poisson", &Fields<Dual>::poisson},
+      {"stiffening", &Fields<Dual>::stiffening},
+      {"skin_modulus", &Fields<Dual>::skin_modulus},
+      {"skin_prestretch", &Fields<Dual>::skin_prestretch},
+      {"interface_normal", &Fields<Dual>::interface_normal},
+      {"interface_tangential", &Fields<Dual>::interface_tangential},
+      {"cut_stiffness", &Fields<Dual>::cut_stiffness}};
+  for (const auto& [name, member] : columns) {
+    if (std::string(name) == "stiffening" && model.breast.law != BulkLaw::neo_hookean) continue;
+    const Eigen::VectorXd direction = random_matrix(static_cast<int>((fields.*member).size()), 1, 11);
+    const auto moved = [&](const Dual& h) {
+      Fields<Dual> f = fields;
+      for (Eigen::Index i = 0; i < direction.size(); ++i) (f.*member)[i] *= 1.0 + 0.1 * direction[i] * h + 0.02 * h * h;
+      return f;
+    };
+    mechanics->parameter_derivative({x, X}, moved(Dual(0.0, 0)), *sums);
+    const Eigen::VectorXd slope = sums->residual;
+    ASSERT_GT(slope.norm(), 1e-6) << name;
+    const double order = taylor_order(
+        [&](double h) {
+          mechanics->set_fields(values_of(moved(Dual(h))));
+          return residual(x, X);
+        },
+        slope, 0.1);
+    mechanics->set_fields(values_of(fields));
+    EXPECT_GT(order, 1.9) << name;
+  }
+}
+
+TEST_P(TermsTest, LoadsHaveTheirDerivative) {
+  const auto moved = [&](const Dual& h) {
+    Fields<Dual> f = fields;
+    f.gravity[0] *= 1.0 + h;
+    f.density *= 1.0 + 0.5 * h;
+    return f;
+  };
+  mechanics->parameter_derivative({x, X}, moved(Dual(0.0, 0)), *sums);
+  const Eigen::VectorXd slope = sums->residual;
+  ASSERT_GT(slope.norm(), 1e-6);
+  EXPECT_GT(taylor_order(
+                [&](double h) {
+                  mechanics->set_fields(values_of(moved(Dual(h))));
+                  return residual(x, X);
+                },
+                slope, 0.1),
+            1.9);
+}
+
+TEST_P(TermsTest, SpringsAndTissueAreForceFreeInTheUndeformedShapeWithoutLoad) {
+  for (Dual& p : fields.skin_prestretch) p = Dual(1.0);
+  mechanics->set_fields(values_of(fields));
+  mechanics->evaluate({X, X, 0.0}, Demand{.energy = true, .residual = true}, *sums);
+  EXPECT_LT(sums->residual.norm(), 1e-10);
+  EXPECT_LT(std::abs(sums->energy), 1e-10);
+}
+
+TEST_P(TermsTest, InvertedElementsAreReported) {
+  Points turned = x;
+  turned.col(2) *= -1;
+  mechanics->evaluate({turned, X}, Demand{.residual = true}, *sums);
+  EXPECT_FALSE(sums->valid);
+  EXPECT_LT(sums->min_det_f, 0);
+  EXPECT_GE(sums->min_cell, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, TermsTest,
+    ::testing::Values(
+        Case{1, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::tension_field, DensityReference::imaged},
+        Case{1, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::full, DensityReference::undeformed},
+        Case{1, BulkLaw::corotational, SkinLaw::corotational, Compression::full, DensityReference::undeformed},
+        Case{1, BulkLaw::corotational_qr, SkinLaw::corotational, Compression::full, DensityReference::imaged},
+        Case{2, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::full, DensityReference::undeformed},
+        Case{2, BulkLaw::corotational, SkinLaw::corotational, Compression::full, DensityReference::imaged}));
+
+}  // namespace
+}  // namespace supine::simulation
