@@ -18,6 +18,7 @@ namespace {
 constexpr double far_mm = 30;
 constexpr double flip_from_mm = 10;
 constexpr double flip_gain = 3;
+constexpr double flip_gain_from_behind = 1.5;  // a scan behind the muscle is wrong anyway: less proof is needed
 constexpr double most_behind = 0.5;
 constexpr int least_over_muscle = 20;  // fewer scan points say nothing about which side of the muscle the scan is on
 
@@ -143,7 +144,7 @@ void check_placement(const Scan& scan, const ModelSkin& model, const reconstruct
   const double behind = share_behind(scan, muscle);
   if (as_is <= flip_from_mm && behind <= most_behind) return;
   const double negated = median_distance_mm(scan, model, true);
-  if (negated * flip_gain < as_is) {
+  if (negated * (behind > most_behind ? flip_gain_from_behind : flip_gain) < as_is) {
     throw InputError(fmt::format(
         "{}: lies {:.1f} mm from the model's skin (median), {:.0f} % of it behind the muscle; with x and y negated it "
         "lies {:.1f} mm from it. Its coordinates are RAS: negate x and y, or name the frame in the file (PLY, OBJ: a "

@@ -37,7 +37,7 @@ class Scan {
 /// Distances are medians, the smaller of scan → skin and skin → scan, so that neither a scan of the whole trunk nor
 /// one of a small patch looks far away. A scan is refused when it is further than 30 mm, or when more than half of its
 /// points over the muscle sheet lie behind it, or when diag(−1, −1, 1) brings it from more than 10 mm to less than a
-/// third of its distance: then it was written as RAS.
+/// third of its distance (two thirds when it lies behind the muscle): then it was written as RAS.
 /// @param muscle  breast-facing muscle sheet, normals toward the breast; without triangles it is not looked at
 /// @throws InputError  with the distances and what to write
 void check_placement(const Scan& scan, const ModelSkin& model, const reconstruction::Surface& muscle,

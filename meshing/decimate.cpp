@@ -5,7 +5,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "common/error.h"
@@ -127,23 +129,27 @@ std::vector<Eigen::Vector3d> crossing_places(const Surface& surface) {
   return places;
 }
 
-// Every place goes one level below the finest level that already claims it; places claimed anew nearby are not
-// repeated.
+// One place of each cell of a grid of @p cell_mm, so that a region too far away costs a few comparisons only.
+std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& places, double cell_mm) {
+  std::map<std::array<long, 3>, Eigen::Vector3d> cells;
+  for (const Eigen::Vector3d& at : places) {
+    const Eigen::Vector3d cell = (at / cell_mm).array().floor();
+    cells.emplace(std::array<long, 3>{std::lround(cell.x()), std::lround(cell.y()), std::lround(cell.z())}, at);
+  }
+  std::vector<Eigen::Vector3d> result;
+  for (const auto& [cell, at] : cells) result.push_back(at);
+  return result;
+}
+
+// Every place goes one level below the finest level that claims it already.
 void add_places(const std::vector<Eigen::Vector3d>& places, double edge_mm, std::vector<FinePlace>& fine) {
   const std::size_t before = fine.size();
-  for (const Eigen::Vector3d& at : places) {
+  for (const Eigen::Vector3d& at : thinned(places, edge_mm / 4)) {
     int level = 0;
     for (std::size_t i = 0; i < before; ++i)
-      if ((fine[i].point_mm - at).norm() < 2 * edge_mm / std::exp2(fine[i].level))
-        level = std::max(level, fine[i].level);
-    level = std::min(level + 1, most_levels);
-    const double apart = 0.25 * edge_mm / std::exp2(level);
-    if (std::any_of(fine.begin() + static_cast<std::ptrdiff_t>(before), fine.end(), [&](const FinePlace& place) {
-          return place.level == level && (place.point_mm - at).norm() < apart;
-        }))
-      continue;
-    // A finer place needs the coarser levels around it, so that edges grow step by step.
-    for (int l = 1; l <= level; ++l) fine.push_back({at, l});
+      if ((fine[i].point_mm - at).norm() < 2 * edge_mm / std::exp2(fine[i].level)) level = std::max(level, fine[i].level);
+    // The coarser levels surround the finer ones, so that edges grow step by step.
+    for (int l = 1; l <= std::min(level + 1, most_levels); ++l) fine.push_back({at, l});
   }
 }
 

@@ -16,6 +16,7 @@
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLUnstructuredGridWriter.h>
 
+#include <fstream>
 #include <limits>
 
 #include "common/error.h"
@@ -109,15 +110,15 @@ vtkSmartPointer<vtkUnstructuredGrid> to_grid(const TetMesh& mesh, const Points& 
 }
 
 void write_grid(vtkUnstructuredGrid& grid, const std::filesystem::path& file) {
+  const std::string refusal = fmt::format("{}: cannot be written (disk full, or no permission?)", file.string());
+  if (!std::ofstream(file)) throw InputError(refusal);  // before VTK prints pages about it
   vtkNew<vtkXMLUnstructuredGridWriter> writer;
   writer->SetInputData(&grid);
   writer->SetFileName(file.c_str());
   writer->SetDataModeToAppended();
   writer->EncodeAppendedDataOff();
   writer->SetCompressorTypeToZLib();
-  if (writer->Write() != 1 || writer->GetErrorCode() != 0) {
-    throw InputError(fmt::format("{}: cannot be written (disk full, or no permission?)", file.string()));
-  }
+  if (writer->Write() != 1 || writer->GetErrorCode() != 0) throw InputError(refusal);
 }
 
 void check_rows(const std::string& name, Eigen::Index rows, Eigen::Index wanted, const char* of) {

@@ -104,7 +104,7 @@ Surface remesh(const Surface& surface, double edge_mm, const std::vector<FinePla
                                  .number_of_relaxation_steps(3)
                                  .edge_is_constrained_map(work.border)
                                  .face_patch_map(work.region)
-                                 .relax_constraints(true));
+                                 .relax_constraints(false));
   }
   return from_cgal(work, surface.region.size() > 0);
 }

@@ -25,36 +25,37 @@ struct AllowedCuts {
 
 /// One body position: how things fall, and what was measured there.
 struct Pose {
-  std::string name;                                 ///< "prone", "supine", or the user's
-  Eigen::Vector3d gravity;                          ///< unit vector, LPS
-  std::optional<std::filesystem::path> surface;     ///< measured surface
-  std::optional<double> noise_mm;                   ///< 1 sigma along the normal; absent = estimate it
-  std::optional<std::filesystem::path> landmarks;   ///< CSV
+  std::string name;                                ///< "prone", "supine", or the user's
+  Eigen::Vector3d gravity;                         ///< unit vector, LPS
+  std::optional<std::filesystem::path> surface;    ///< measured surface
+  std::optional<double> noise_mm;                  ///< 1 sigma along the normal; absent = estimate it
+  std::optional<std::filesystem::path> landmarks;  ///< CSV
 };
 
 /// case.toml: what was measured. Coordinates are LPS after reading, whatever `frame` says.
 struct Case {
   std::filesystem::path folder;
   std::string name;
-  std::string frame = "LPS";                        ///< of coordinates in files that name none: LPS or RAS
-  std::string side;                                 ///< left, right or both
+  std::string frame = "LPS";  ///< of coordinates in files that name none: LPS or RAS
+  std::string side;           ///< left, right or both
 
-  std::filesystem::path image_file;                 ///< absolute or relative to the working directory, exists
-  std::string image_kind;                           ///< labels or mri
+  std::filesystem::path image_file;  ///< absolute or relative to the working directory, exists
+  std::string image_kind;            ///< labels or mri
   AllowedCuts cut;
-  std::map<int, segmentation::Tissue> labels;       ///< value in the file → tissue (kind = labels)
-  std::optional<segmentation::Recipe> recipe;       ///< kind = mri
+  std::map<int, segmentation::Tissue> labels;  ///< value in the file → tissue (kind = labels)
+  std::optional<segmentation::Recipe> recipe;  ///< kind = mri
 
-  std::vector<Pose> poses;                          ///< prone first, supine second, then in file order
+  std::vector<Pose> poses;  ///< prone first, supine second, then in file order
   std::optional<std::filesystem::path> prone_landmarks;
   std::vector<std::string> calibrated_poses = {"supine"};
 
-  const Pose& pose(std::string_view name) const;    ///< @throws InputError listing the poses there are
+  const Pose& pose(std::string_view name) const;  ///< @throws InputError listing the poses there are
 };
 
 /// Reads and checks FOLDER/case.toml.
 /// @throws InputError  naming file, line, key, value and bound: unknown or missing key, wrong type, unknown tissue,
-///   a label value listed twice or empty, gravity zero / not unit (1e-3) / the same in two poses, a file that is not there
+///   a label value listed twice or empty, gravity zero / not unit (1e-3) / the same in two poses, a file that is not
+///   there
 Case read_case(const std::filesystem::path& folder);
 
 }  // namespace supine::pipeline

@@ -32,7 +32,7 @@ Json typed_value(const std::string& text) {
 }
 
 Json option_value(const CLI::Option& option) {
-  if (option.get_expected_min() == 0) return option.count() > 0;  // a switch
+  if (option.get_expected_max() == 0) return option.count() > 0;  // a switch
   const auto& given = option.results();
   if (given.empty()) return option.get_default_str().empty() ? Json() : typed_value(option.get_default_str());
   if (given.size() == 1) return typed_value(given.front());

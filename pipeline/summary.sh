@@ -19,14 +19,15 @@ row() {
 echo
 echo "Figures of $out"
 if [ -f "$out/labels.json" ]; then
-  jq -r '(.tissues // [])[] | select(.ml > 0) | [.name, .ml] | @tsv' "$out/labels.json" |
+  jq -r '.volume_ml // {} | to_entries[] | select(.value > 0 and .key != "air") | [.key, .value] | @tsv' "$out/labels.json" |
     while IFS=$'\t' read -r tissue ml; do row "$tissue" ml %.1f "$ml"; done
 fi
 row "triangles, reconstructed" "" %d "$(figure breast.json .triangles)"
 row "triangles, decimated" "" %d "$(figure coarse.json .triangles)"
 row "tetrahedra" "" %d "$(figure mesh.json .cells)"
-row "sag (undeformed to prone, max)" mm %.2f "$(figure prone.json .sag_max_mm)"
-row "sag (undeformed to supine, max)" mm %.2f "$(figure supine.json .sag_max_mm)"
+row "sag, undeformed to prone, most" mm %.2f "$(figure prone.json .displacement_from_undeformed_mm.max)"
+row "sag, undeformed to supine, most" mm %.2f "$(figure supine.json .displacement_from_undeformed_mm.max)"
+row "way from prone to supine, most" mm %.2f "$(figure supine.json .displacement_from_prone_mm.max)"
 row "round trip to the imaged shape" mm %.1e "$(figure supine.json .round_trip_max_mm)"
 if [ -f "$out/comparison.json" ]; then
   row "MAE (model to scan, study)" mm %.2f "$(figure comparison.json .mae_study_mm)"
@@ -35,6 +36,9 @@ if [ -f "$out/comparison.json" ]; then
   row "95th percentile" mm %.2f "$(figure comparison.json .p95_mm)"
   row "maximum" mm %.2f "$(figure comparison.json .hausdorff_mm)"
 fi
+for file in "$out"/comparison_*.json; do
+  if [ -f "$file" ]; then row "RMS, pose $(jq -r .pose "$file")" mm %.2f "$(jq -r .rms_mm "$file")"; fi
+done
 echo
 echo "For ParaView, in $out:"
 for file in labels.vti breast.vtp muscle.vtp coarse.vtp mesh.vtu prone.vtu undeformed.vtu supine.vtu comparison.vtp scan.vtp; do

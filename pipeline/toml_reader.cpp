@@ -17,31 +17,32 @@ namespace {
 
 namespace fs = std::filesystem;
 
-int levenshtein(std::string_view a, std::string_view b) {
-  std::vector<int> row(b.size() + 1);
+/// Edits between two words: letters inserted, left out, replaced, or two neighbours swapped
+/// (Levenshtein's distance with transpositions, Damerau 1964, in its restricted form).
+int edit_distance(std::string_view a, std::string_view b) {
+  std::vector<int> before(b.size() + 1), previous(b.size() + 1), row(b.size() + 1);
   std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    int diagonal = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const int replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    before.swap(previous);
+    previous.swap(row);
+    row[0] = static_cast<int>(i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({previous[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1), previous[j] + 1, row[j - 1] + 1});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = std::min(row[j], before[j - 2] + 1);
     }
   }
   return row.back();
 }
 
 std::string printed(const toml::node& node) {
+  if (const auto text = node.value_exact<std::string>()) return fmt::format("\"{}\"", *text);
+  if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
   std::ostringstream text;
-  node.visit([&text](const auto& value) {
-    using Value = std::remove_cvref_t<decltype(value)>;
-    if constexpr (std::is_same_v<Value, toml::table>)
-      text << "{ ... }";
-    else if constexpr (std::is_same_v<Value, toml::array>)
-      text << toml::toml_formatter(value);
-    else
-      text << toml::toml_formatter(value);
-  });
+  if (const toml::array* array = node.as_array()) {
+    for (const toml::node& element : *array) text << (text.tellp() > 0 ? ", " : "") << printed(element);
+    return "[" + text.str() + "]";
+  }
+  node.visit([&text](const auto& value) { text << toml::toml_formatter(value); });
   return text.str();
 }
 
@@ -78,7 +79,7 @@ std::string nearest_name(std::string_view name, const std::vector<std::string>& 
   std::string nearest;
   int smallest = std::max<int>(1, static_cast<int>(name.size()) / 3) + 1;
   for (const std::string& candidate : known) {
-    const int distance = levenshtein(name, candidate);
+    const int distance = edit_distance(name, candidate);
     if (distance >= smallest) continue;
     smallest = distance;
     nearest = candidate;

@@ -11,8 +11,8 @@
 
 namespace supine::pipeline {
 
-/// The name of @p known that is closest to @p name by Levenshtein distance; empty when none is close
-/// (more than a third of the letters differ).
+/// The name of @p known that is closest to @p name by edit distance (a swap of neighbours is one edit); empty when
+/// none is close (more than a third of the letters differ).
 std::string nearest_name(std::string_view name, const std::vector<std::string>& known);
 
 /// "a", "a or b", "a, b or c".

@@ -59,9 +59,10 @@ class Run {
 class Tool {
  public:
   virtual ~Tool() = default;
-  virtual std::string name() const = 0;      ///< "supine-segment"
-  virtual std::string summary() const = 0;   ///< a sentence, then examples; shown by --help
-  /// Adds positionals and options to @p app. -o, --threads, --json, --force, --quiet, --help, --version are there already.
+  virtual std::string name() const = 0;     ///< "supine-segment"
+  virtual std::string summary() const = 0;  ///< a sentence, then examples; shown by --help
+  /// Adds positionals and options to @p app. -o, --threads, --json, --force, --quiet, --help, --version are there
+  /// already.
   virtual void declare(CLI::App& app) = 0;
   virtual Outcome run(Run& run) = 0;
 

@@ -14,6 +14,9 @@
 namespace supine::segmentation {
 namespace {
 
+// So that a bound of a whole number of voxels includes it.
+constexpr double rounding = 1e-9;
+
 /// The state the steps share; one overload of run per kind of step, which returns its line of the log.
 class Kitchen {
  public:
@@ -36,10 +39,10 @@ class Kitchen {
   std::string run(const Grow& step);
   std::string run(const Islands& step) {
     return store(step.mask, keep_islands(mask(step.mask), grid(), static_cast<std::size_t>(step.keep_largest),
-                                         voxels(step.min_ml)));
+                                         voxels(step.min_ml) * (1 - rounding)));
   }
   std::string run(const Holes& step) {
-    return store(step.mask, fill_holes(mask(step.mask), grid(), voxels(step.max_ml)));
+    return store(step.mask, fill_holes(mask(step.mask), grid(), voxels(step.max_ml) * (1 + rounding)));
   }
   std::string run(const Combine& step);
   std::string run(const Morph& step);
@@ -51,8 +54,7 @@ class Kitchen {
 
  private:
   const Grid& grid() const { return image_.grid; }
-  /// Volumes are compared with whole voxels; the hair absorbs rounding.
-  double voxels(double ml) const { return ml * 1000 / grid().voxel_volume_mm3() * (1 + 1e-9); }
+  double voxels(double ml) const { return ml * 1000 / grid().voxel_volume_mm3(); }
   const Mask& mask(const std::string& name) const;
   Mask within(const std::string& name) const { return name.empty() ? Mask() : mask(name); }
   std::string store(const std::string& name, Mask mask);

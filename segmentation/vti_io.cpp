@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <vtkCallbackCommand.h>
 #include <vtkCellData.h>
+#include <vtkExecutive.h>
 #include <vtkFieldData.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
@@ -38,28 +39,43 @@ void add_strings(vtkImageData& image, const char* name, std::initializer_list<st
   image.GetFieldData()->AddArray(array);
 }
 
-/// Collects VTK's error text instead of letting it reach the terminal.
-void collect(vtkObject*, unsigned long, void* client, void* text) {
-  auto& message = *static_cast<std::string*>(client);
-  if (message.empty() && text) message = static_cast<const char*>(text);
-}
+/// Collects the text of VTK's errors instead of letting it reach the terminal.
+class ErrorCollector {
+ public:
+  explicit ErrorCollector(vtkAlgorithm& algorithm) {
+    command_->SetCallback([](vtkObject*, unsigned long, void* client, void* text) {
+      auto& message = *static_cast<std::string*>(client);
+      if (message.empty() && text) message = static_cast<const char*>(text);
+    });
+    command_->SetClientData(&message_);
+    algorithm.AddObserver(vtkCommand::ErrorEvent, command_);
+    algorithm.GetExecutive()->AddObserver(vtkCommand::ErrorEvent, command_);
+  }
+  vtkCommand* command() { return command_; }
+  std::string message() const {
+    std::string line = message_;
+    std::replace(line.begin(), line.end(), '\n', ' ');
+    return line;
+  }
+
+ private:
+  std::string message_;
+  vtkNew<vtkCallbackCommand> command_;
+};
 
 void update(vtkXMLImageDataReader& reader, const std::filesystem::path& file) {
-  std::string message;
-  vtkNew<vtkCallbackCommand> command;
-  command->SetCallback(collect);
-  command->SetClientData(&message);
-  reader.SetReaderErrorObserver(command);
-  reader.SetParserErrorObserver(command);
-  reader.AddObserver("ErrorEvent", command);
+  ErrorCollector errors(reader);
+  reader.SetReaderErrorObserver(errors.command());
+  reader.SetParserErrorObserver(errors.command());
   reader.SetFileName(file.c_str());
   reader.Update();
   reader.SetReaderErrorObserver(nullptr);
   reader.SetParserErrorObserver(nullptr);
   reader.RemoveAllObservers();
-  std::replace(message.begin(), message.end(), '\n', ' ');
-  if (!message.empty() || reader.GetErrorCode() != 0)
-    throw InputError(fmt::format("{}: cannot be read as VTI (damaged or truncated?): {}", file.string(), message));
+  reader.GetExecutive()->RemoveAllObservers();
+  if (!errors.message().empty() || reader.GetErrorCode() != 0)
+    throw InputError(
+        fmt::format("{}: cannot be read as VTI (damaged or truncated?): {}", file.string(), errors.message()));
 }
 
 /// The scalar array: `tissue`, else the active scalars, else the only array; of points, else of cells.
@@ -144,18 +160,17 @@ void write_labels(const LabelImage& labels, const std::filesystem::path& file) {
   names->SetName("tissue_names");
   for (const auto name : tissue_names) names->InsertNextValue(std::string(name));
   data->GetFieldData()->AddArray(names);
-  std::string message;
-  vtkNew<vtkCallbackCommand> command;
-  command->SetCallback(collect);
-  command->SetClientData(&message);
   vtkNew<vtkXMLImageDataWriter> writer;
-  writer->AddObserver("ErrorEvent", command);
+  ErrorCollector errors(*writer);
   writer->SetFileName(file.c_str());
   writer->SetInputData(data);
   writer->SetCompressionLevel(1);
   writer->EncodeAppendedDataOff();
-  if (writer->Write() != 1 || !message.empty())
-    throw InputError(fmt::format("{}: cannot be written: {}", file.string(), message.empty() ? "disk full?" : message));
+  const bool written = writer->Write() == 1;
+  writer->RemoveAllObservers();
+  writer->GetExecutive()->RemoveAllObservers();
+  if (!written || !errors.message().empty())
+    throw InputError(fmt::format("{}: cannot be written: {}", file.string(), errors.message()));
 }
 
 LabelImage read_labels(const std::filesystem::path& file) {

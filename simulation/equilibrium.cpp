@@ -20,7 +20,11 @@ EquilibriumSolver::EquilibriumSolver(const Mechanics& mechanics, SolveOptions op
     : mechanics_(mechanics), options_(std::move(options)), sums_(mechanics.pattern()) {}
 
 SolveReport EquilibriumSolver::forward(const Points& X, Points& x, const std::string& what) {
-  if (!cholesky_) cholesky_ = std::make_unique<CholeskySolver>(sums_.tangent);
+  if (mechanics_.has_energy()) {
+    if (!cholesky_) cholesky_ = std::make_unique<CholeskySolver>(sums_.tangent);
+  } else if (!lu_) {
+    lu_ = std::make_unique<LuSolver>(sums_.tangent);  // without an energy ∂r/∂x is not symmetric
+  }
   x = X;
   return step_load(Unknown::deformed, X, x, what);
 }
@@ -79,8 +83,8 @@ void EquilibriumSolver::evaluate(Unknown unknown, const Points& known, const Poi
 }
 
 bool EquilibriumSolver::direction(Unknown unknown, Eigen::VectorXd& step) {
-  if (unknown == Unknown::undeformed) {
-    if (!lu_->factorise(sums_.reference_tangent)) return false;
+  if (unknown == Unknown::undeformed || !mechanics_.has_energy()) {
+    if (!lu_->factorise(unknown == Unknown::undeformed ? sums_.reference_tangent : sums_.tangent)) return false;
     step = -lu_->solve(sums_.residual);
     return step.allFinite();
   }

@@ -54,17 +54,22 @@ class CompareTool : public Tool {
   }
 
   Outcome run(Run& run) override {
+    if (output.extension() == ".vtp") {
+      throw InputError(
+          fmt::format("-o {}: names the folder of the two output files; leave the file name out", output.string()));
+    }
     run.stage("read");
     const Inputs inputs = read(run);
     const std::string scan_name = inputs.pose.surface->string();
-    run.stage("anatomy");
-    const calibration::SkinAreas areas = find_areas(inputs, run);
-    run.stage("compare");
+    run.stage("check");
     const calibration::ModelSkin model(inputs.predicted.mesh, inputs.predicted.positions);
     const calibration::Scan scan(inputs.surface, model, scan_name);
     calibration::check_placement(scan, model, inputs.predicted.mesh.muscle, scan_name);
-    const Comparison comparison = calibration::compare(model, scan, areas);
     const auto landmarks = compare_landmarks(inputs, run);
+    run.stage("anatomy");
+    const calibration::SkinAreas areas = find_areas(inputs, run);
+    run.stage("compare");
+    const Comparison comparison = calibration::compare(model, scan, areas);
     run.stage("write");
     const fs::path skin_file = target(inputs.pose, "comparison"), scan_file = target(inputs.pose, "scan");
     calibration::write_comparison(comparison, model, areas, run.output(skin_file));

@@ -126,6 +126,11 @@ TEST_F(CompareTool, PoseWithoutSurfaceIsRefusedAndNothingIsWritten) {
   EXPECT_FALSE(fs::exists(out / "comparison_upright.vtp"));
 }
 
+TEST_F(CompareTool, OutputIsAFolder) {
+  EXPECT_EQ(run((out / "supine.vtu").string() + " -o " + (out / "comparison.vtp").string()), 2);
+  EXPECT_NE(said().find("folder"), std::string::npos) << said();
+}
+
 TEST_F(CompareTool, ScanInMetresIsRefused) {
   scan.points *= 1e-3;
   reconstruction::write_surface(scan, folder / "supine.vtp");

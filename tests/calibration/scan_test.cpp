@@ -106,9 +106,19 @@ TEST_F(DomeScan, WrittenAsRasItIsRefusedAndTheFlipIsNamed) {
 }
 
 TEST_F(DomeScan, BehindTheMuscleItIsRefused) {
+  // Off the origin, so that the flip is no help.
+  mesh.points.col(0).array() += 60;
+  mesh.muscle.points.col(0).array() += 60;
+  model = ModelSkin(mesh, mesh.points);
   reconstruction::Surface back = mesh.muscle;
   back.points.col(1).array() += 6;  // 18 mm from the rim's skin
   expect_words(placement(back), {"s.ply", "100 %", "behind it", "LPS"});
+}
+
+TEST_F(DomeScan, WrittenAsRasBehindTheMuscleAndOffThePredictionTheFlipIsStillNamed) {
+  skin.points.col(1).array() += 7;
+  skin.points.leftCols(2) *= -1;
+  expect_words(placement(skin), {"RAS", "behind"});
 }
 
 }  // namespace supine::calibration

@@ -122,6 +122,8 @@ struct BadCase {
   std::vector<std::string> words;
 };
 
+void PrintTo(const BadCase& bad, std::ostream* out) { *out << bad.from << " -> " << bad.to; }
+
 class BadCaseFile : public CaseFile, public testing::WithParamInterface<BadCase> {};
 
 TEST_P(BadCaseFile, IsRefusedWithPlaceValueAndBound) {

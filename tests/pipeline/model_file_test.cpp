@@ -127,6 +127,8 @@ struct BadModel {
   std::vector<std::string> words;
 };
 
+void PrintTo(const BadModel& bad, std::ostream* out) { *out << bad.from << " -> " << bad.to; }
+
 class BadModelFile : public ModelFile, public testing::WithParamInterface<BadModel> {};
 
 TEST_P(BadModelFile, IsRefusedWithPlaceValueAndBound) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/tool.h"
 
+#include <csignal>
 #include <fstream>
 
 #include "common/error.h"
@@ -29,6 +30,7 @@ class CopyTool : public Tool {
     run.warn("a caution");
     if (fail == "input") throw InputError("bad label 7");
     if (fail == "numbers") throw NumericalFailure("stopped at load 0.5");
+    if (fail == "interrupt") raise(SIGINT);
     if (fail == "bug") throw std::logic_error("index");
     return fail == "target" ? Outcome::target_not_met : Outcome::done;
   }
@@ -41,15 +43,19 @@ class ToolMain : public testing::Test {
  protected:
   ToolMain() { write_text(folder_ / "in.txt", "abc"); }
 
-  /// Runs the tool, catching what it prints.
-  int call(std::vector<std::string> arguments) {
+  static int call_main(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "supine-copy");
     std::vector<char*> raw;
     for (std::string& argument : arguments) raw.push_back(argument.data());
     CopyTool tool;
+    return tool_main(tool, static_cast<int>(raw.size()), raw.data());
+  }
+  [[noreturn]] static void call_and_exit(const std::vector<std::string>& arguments) { std::exit(call_main(arguments)); }
+  /// Runs the tool, catching what it prints.
+  int call(const std::vector<std::string>& arguments) {
     testing::internal::CaptureStdout();
     testing::internal::CaptureStderr();
-    const int code = tool_main(tool, static_cast<int>(raw.size()), raw.data());
+    const int code = call_main(arguments);
     out_ = testing::internal::GetCapturedStdout();
     err_ = testing::internal::GetCapturedStderr();
     return code;
@@ -133,6 +139,12 @@ TEST_F(ToolMain, NumericalFailureEndsWith3AndWritesNothing) {
 
 TEST_F(ToolMain, AnUnexpectedErrorEndsWith3AndWritesNothing) {
   EXPECT_EQ(copy({"--fail", "bug"}), 3);
+  EXPECT_EQ(files_written(), 0u);
+}
+
+TEST_F(ToolMain, CtrlCEndsWith130AndWritesNothing) {
+  EXPECT_EXIT(call_and_exit({in(), "-o", target(), "--fail", "interrupt"}), testing::ExitedWithCode(130),
+              "interrupted");
   EXPECT_EQ(files_written(), 0u);
 }
 

@@ -44,6 +44,17 @@ void append_voxels(std::ofstream& stream, const GreyImage& image) {
                static_cast<std::streamsize>(image.voxels.size() * sizeof(float)));
 }
 
+std::string nrrd_header(const GreyImage& image, const std::string& frame, const std::string& encoding) {
+  const Eigen::Matrix3d axes = steps(image, frame);
+  return fmt::format(
+      "NRRD0004\ntype: float\ndimension: 3\nspace: {}\nsizes: {} {} {}\nspace directions: ({}) ({}) ({})\nkinds: "
+      "domain domain domain\n"
+      "endian: little\nencoding: {}\nspace origin: ({})\n\n",
+      frame == "RAS" ? "right-anterior-superior" : "left-posterior-superior", image.grid.size.x(), image.grid.size.y(),
+      image.grid.size.z(), numbers(axes.col(0), ","), numbers(axes.col(1), ","), numbers(axes.col(2), ","), encoding,
+      numbers(Eigen::Vector3d(signs(frame).cwiseProduct(image.grid.origin_mm)), ","));
+}
+
 }  // namespace
 
 TemporaryFolder::TemporaryFolder() {
@@ -69,16 +80,16 @@ GreyImage numbered_image(const Eigen::Matrix3d& direction) {
 Eigen::Matrix3d oblique() { return Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix(); }
 
 void write_nrrd(const fs::path& file, const GreyImage& image, const std::string& frame) {
-  const Eigen::Matrix3d axes = steps(image, frame);
   std::ofstream stream(file, std::ios::binary);
-  stream << fmt::format(
-      "NRRD0004\ntype: float\ndimension: 3\nspace: {}\nsizes: {} {} {}\nspace directions: ({}) ({}) ({})\nkinds: "
-      "domain domain domain\n"
-      "endian: little\nencoding: raw\nspace origin: ({})\n\n",
-      frame == "RAS" ? "right-anterior-superior" : "left-posterior-superior", image.grid.size.x(), image.grid.size.y(),
-      image.grid.size.z(), numbers(axes.col(0), ","), numbers(axes.col(1), ","), numbers(axes.col(2), ","),
-      numbers(Eigen::Vector3d(signs(frame).cwiseProduct(image.grid.origin_mm)), ","));
+  stream << nrrd_header(image, frame, "raw");
   append_voxels(stream, image);
+}
+
+void write_gzip_nrrd(const fs::path& file, const GreyImage& image) {
+  std::ofstream(file, std::ios::binary) << nrrd_header(image, "LPS", "gzip");
+  const gzFile stream = gzopen(file.c_str(), "ab");
+  gzwrite(stream, image.voxels.data(), static_cast<unsigned>(image.voxels.size() * sizeof(float)));
+  gzclose(stream);
 }
 
 void write_meta_image(const fs::path& file, const GreyImage& image, const std::string& frame) {

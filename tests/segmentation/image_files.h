@@ -34,6 +34,7 @@ Eigen::Matrix3d oblique();
 
 // Each writes float voxels. The image is in LPS; the file holds coordinates in `frame` (LPS or RAS).
 void write_nrrd(const std::filesystem::path& file, const GreyImage& image, const std::string& frame = "LPS");
+void write_gzip_nrrd(const std::filesystem::path& file, const GreyImage& image);  // LPS
 void write_meta_image(const std::filesystem::path& file, const GreyImage& image, const std::string& frame = "LPS");
 enum class Form { sform, qform, none };
 void write_nifti(const std::filesystem::path& file, const GreyImage& image, Form form = Form::sform);  // always RAS

@@ -35,15 +35,35 @@ TEST_F(ImageRefusal, MissingFileAndUnknownFormat) {
   expect_refused("a.jpg", "unknown image format");
 }
 
+// Cut anywhere, a file is refused or (when only closing tags or padding went) gives the same voxels.
 TEST_F(ImageRefusal, TruncatedFiles) {
   const GreyImage image = numbered_image();
   write_nrrd(folder_ / "a.nrrd", image);
+  write_gzip_nrrd(folder_ / "b.nrrd", image);
   write_meta_image(folder_ / "a.mha", image);
   write_nifti(folder_ / "a.nii", image);
   write_nifti(folder_ / "a.nii.gz", image);
   write_vti(folder_ / "a.vti", image);
-  for (const std::string file : {"a.nrrd", "a.mha", "a.nii", "a.nii.gz", "a.vti"}) {
-    ASSERT_EQ(message_of([&] { read_image(folder_ / file, "LPS"); }), "");
+  for (const std::string file : {"a.nrrd", "b.nrrd", "a.mha", "a.nii", "a.nii.gz", "a.vti"}) {
+    ASSERT_EQ(read_image(folder_ / file, "LPS").image.voxels, image.voxels) << file;
+    const auto whole = std::filesystem::file_size(folder_ / file);
+    for (std::size_t missing = 1; missing < whole; missing += 11) {
+      std::filesystem::resize_file(folder_ / file, whole - missing);
+      const std::string message = message_of([&] {
+        EXPECT_EQ(read_image(folder_ / file, "LPS").image.voxels, image.voxels)
+            << file << " without " << missing << " bytes";
+      });
+      EXPECT_TRUE(missing <= 300 || message.find(file) != std::string::npos) << missing << " " << message;
+    }
+  }
+}
+
+TEST_F(ImageRefusal, TruncatedVoxelsAreCalledTruncated) {
+  const GreyImage image = numbered_image();
+  write_nrrd(folder_ / "a.nrrd", image);
+  write_meta_image(folder_ / "a.mha", image);
+  write_nifti(folder_ / "a.nii.gz", image);
+  for (const std::string file : {"a.nrrd", "a.mha", "a.nii.gz"}) {
     std::filesystem::resize_file(folder_ / file, std::filesystem::file_size(folder_ / file) - 20);
     expect_refused(file, "truncated");
   }

@@ -47,7 +47,7 @@ TEST_P(RealVolume, RecipeFindsTheTissuesOfAGreyVolume) {
 }
 
 INSTANTIATE_TEST_SUITE_P(HiddenOpen, RealVolume, ::testing::Values(T1Case{"ligament-1", 82}, T1Case{"null-1", 76}),
-                         [](const auto& info) { return info.index == 0 ? "ligament" : "null"; });
+                         [](const auto& which) { return which.index == 0 ? "ligament" : "null"; });
 
 TEST(RealVolume, PhantomVolumesAreThoseOfTheirPages) {
   const fs::path file = shared_data() / "phantoms" / "breastphantom_scattered_1mm.nrrd";

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "tests/pipeline/small_run.h"
+
+#include <cstdlib>
+#include <memory>
+#include <stdexcept>
+
+#include "tests/pipeline/small_case.h"
+#include "tests/pipeline/temporary_folder.h"
+
+namespace supine::pipeline {
+
+std::vector<std::string> stage_command(const std::string& stage, const std::filesystem::path& folder) {
+  const std::string in_case = folder.string(), out = (folder / "out").string();
+  const std::vector<std::string> tail = {"--threads", "2"};
+  std::vector<std::string> command = {tool(stage)};
+  const auto add = [&command](std::vector<std::string> words) {
+    command.insert(command.end(), words.begin(), words.end());
+  };
+  if (stage == "segment") add({in_case, "-o", out + "/labels.vti"});
+  if (stage == "reconstruct") add({out + "/labels.vti", "-o", out});
+  if (stage == "decimate")
+    add({out + "/breast.vtp", "--triangles", "1200", "--max-distance-mm", "1.5", "-o", out + "/coarse.vtp"});
+  if (stage == "tetrahedralise")
+    add({out + "/coarse.vtp", out + "/muscle.vtp", out + "/labels.vti", "-o", out + "/mesh.vtu"});
+  if (stage == "simulate") add({in_case, out + "/mesh.vtu", "--model", in_case + "/model.toml", "-o", out});
+  if (stage == "compare") add({in_case, out + "/supine.vtu", "-o", out});
+  add(tail);
+  return command;
+}
+
+void make_small_run(const std::filesystem::path& folder) {
+  write_small_case(folder);
+  for (const char* stage : {"segment", "reconstruct", "decimate", "tetrahedralise", "simulate", "compare"}) {
+    const Finished finished = run_process(stage_command(stage, folder));
+    if (finished.code > 1) throw std::runtime_error(std::string(stage) + " of the small case failed: " + finished.err);
+  }
+}
+
+const std::filesystem::path& small_run() {
+  static const std::unique_ptr<TemporaryFolder> own = [] {
+    if (std::getenv("SUPINE_SMALL_RUN")) return std::unique_ptr<TemporaryFolder>();
+    auto folder = std::make_unique<TemporaryFolder>();
+    make_small_run(folder->path());
+    return folder;
+  }();
+  static const std::filesystem::path path = own ? own->path() : std::filesystem::path(std::getenv("SUPINE_SMALL_RUN"));
+  return path;
+}
+
+}  // namespace supine::pipeline
