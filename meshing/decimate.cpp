@@ -24,7 +24,8 @@ using reconstruction::Surface;
 using reconstruction::SurfaceReport;
 using reconstruction::SurfaceTree;
 
-constexpr int most_levels = 4;  // edges down to 1/16 of the coarsest
+constexpr int most_levels = 3;       // edges down to 1/8 of the coarsest
+constexpr double start_share = 0.2;  // edges of what is remeshed again and again, of the coarsest
 constexpr int most_tries = 16;
 constexpr double bound_share = 0.9;  // places nearer to the bound than this are refined
 
@@ -32,6 +33,7 @@ struct Input {
   const Surface& surface;
   SurfaceReport report;
   SurfaceTree tree;
+  Surface start;  // what is remeshed: the input, or nearly so where that has many more triangles than needed
 };
 
 Points samples_of(const Surface& surface) {
@@ -53,14 +55,14 @@ std::vector<MeshEdge> region_borders(const Surface& surface) {
   std::vector<MeshEdge> edges = reconstruction::mesh_edges(surface.triangles);
   if (surface.region.size() == 0) return {};
   std::erase_if(edges, [&surface](const MeshEdge& edge) {
-    return edge.triangles.size() == 2 && surface.region(edge.triangles[0]) == surface.region(edge.triangles[1]);
+    return edge.count == 2 && surface.region(edge.triangles[0]) == surface.region(edge.triangles[1]);
   });
   return edges;
 }
 
-// Largest distance of the output's region borders from those of the input. Segments are searched one by one: they are
-// few.
-double border_distance_mm(const Surface& in, const Surface& out) {
+// Distance of samples on the output's region borders from those of the input. Searched one by one: they are few.
+double border_distance_mm(const Surface& in, const Surface& out, double bound_mm,
+                          std::vector<Eigen::Vector3d>& places) {
   const std::vector<MeshEdge> from = region_borders(out), to = region_borders(in);
   if (from.empty() || to.empty()) return 0;
   double largest = 0;
@@ -73,6 +75,7 @@ double border_distance_mm(const Surface& in, const Surface& out) {
         const double share = std::clamp((at - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
         nearest = std::min(nearest, (a + share * along - at).squaredNorm());
       }
+      if (nearest > bound_mm * bound_mm) places.emplace_back(at.transpose());
       largest = std::max(largest, nearest);
     }
   }
@@ -113,6 +116,7 @@ std::vector<Eigen::Vector3d> places_too_far(const Input& in, double bound_mm, De
   result.from_input_mm = from_input.maxCoeff();
   result.distance_mm = std::max(result.to_input_mm, result.from_input_mm);
   std::vector<Eigen::Vector3d> places;
+  result.border_mm = border_distance_mm(in.surface, result.surface, bound_mm, places);
   if (result.distance_mm <= bound_mm) return places;
   for (Eigen::Index p = 0; p < samples.rows(); ++p)
     if (to_input(p) > bound_share * bound_mm) places.emplace_back(samples.row(p).transpose());
@@ -147,7 +151,8 @@ void add_places(const std::vector<Eigen::Vector3d>& places, double edge_mm, std:
   for (const Eigen::Vector3d& at : thinned(places, edge_mm / 4)) {
     int level = 0;
     for (std::size_t i = 0; i < before; ++i)
-      if ((fine[i].point_mm - at).norm() < 2 * edge_mm / std::exp2(fine[i].level)) level = std::max(level, fine[i].level);
+      if ((fine[i].point_mm - at).norm() < 2 * edge_mm / std::exp2(fine[i].level))
+        level = std::max(level, fine[i].level);
     // The coarser levels surround the finer ones, so that edges grow step by step.
     for (int l = 1; l <= std::min(level + 1, most_levels); ++l) fine.push_back({at, l});
   }
@@ -170,7 +175,7 @@ DecimateResult unchanged(const Input& in, const DecimateOptions& options, std::s
 bool refine_to_bound(const Input& in, double edge_mm, const DecimateOptions& options, DecimateResult& result) {
   std::vector<FinePlace> fine;
   for (int round = 0; round <= most_levels + 1; ++round) {
-    result.surface = remesh(in.surface, edge_mm, fine);
+    result.surface = remesh(in.start, edge_mm, fine);
     give_volume_back(in.report, result.surface);
     if (!same_topology(in.report, reconstruction::check_surface(result.surface))) return false;
     std::vector<Eigen::Vector3d> places = places_too_far(in, options.max_distance_mm, result);
@@ -194,10 +199,12 @@ void DecimateOptions::check() const {
 DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
   options.check();
   reconstruction::require_solid(in, "the surface to decimate");
-  const Input input{in, reconstruction::check_surface(in), SurfaceTree(in)};
+  Input input{in, reconstruction::check_surface(in), SurfaceTree(in), in};
   if (input.report.triangles <= options.target_triangles) return unchanged(input, options, "");
 
   double edge_mm = std::sqrt(4 * input.report.area_mm2 / (std::numbers::sqrt3 * options.target_triangles));
+  const auto start_triangles = static_cast<Eigen::Index>(options.target_triangles / (start_share * start_share));
+  if (input.report.triangles > 2 * start_triangles) input.start = remesh(in, start_share * edge_mm, {});
   DecimateResult best;
   for (int attempt = 0; attempt < most_tries; ++attempt) {
     DecimateResult result;
@@ -226,7 +233,6 @@ DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
         "{} triangles are needed to stay within {} mm of the input; allow more triangles or a larger distance",
         best.surface.triangles.rows(), options.max_distance_mm);
   best.volume_change = reconstruction::check_surface(best.surface).volume_mm3 / input.report.volume_mm3 - 1;
-  best.border_mm = border_distance_mm(in, best.surface);
   measure_shape(best);
   return best;
 }

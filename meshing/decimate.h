@@ -17,13 +17,13 @@ struct DecimateOptions {
 
 struct DecimateResult {
   reconstruction::Surface
-      surface;                    ///< closed, manifold, outward, no self-intersections; every triangle with its region
-  double distance_mm = 0;         ///< largest distance found, the larger of the next two; <= max_distance_mm
-  double to_input_mm = 0;         ///< output → input, over points, edge middles and centroids
-  double from_input_mm = 0;       ///< input → output, over all points of the input
-  double border_mm = 0;           ///< region borders: output → input, over points and edge middles
-  double volume_change = 0;       ///< relative to the input
-  double edge_mm = 0;             ///< mean edge length
+      surface;               ///< closed, manifold, outward, no self-intersections; every triangle with its region
+  double distance_mm = 0;    ///< largest distance found, the larger of the next two; <= max_distance_mm
+  double to_input_mm = 0;    ///< output → input, over points, edge middles and centroids
+  double from_input_mm = 0;  ///< input → output, over all points of the input
+  double border_mm = 0;      ///< region borders: output → input, over points and edge middles; <= max_distance_mm
+  double volume_change = 0;  ///< relative to the input
+  double edge_mm = 0;        ///< mean edge length
   double smallest_angle_deg = 0;  ///< of all triangles
   bool reached_target = false;    ///< at most target_triangles
   std::string reason;             ///< why not, empty when reached

@@ -58,9 +58,8 @@ struct SparseRows {
 std::vector<std::vector<int>> stencils(const Surface& surface, const std::vector<MeshEdge>& edges) {
   std::vector<std::vector<int>> along(surface.points.rows());
   for (const MeshEdge& edge : edges) {
-    const bool between =
-        edge.triangles.size() != 2 ||
-        (surface.region.size() > 0 && surface.region(edge.triangles[0]) != surface.region(edge.triangles[1]));
+    const bool between = edge.count != 2 || (surface.region.size() > 0 &&
+                                             surface.region(edge.triangles[0]) != surface.region(edge.triangles[1]));
     if (!between) continue;
     along[edge.points[0]].push_back(edge.points[1]);
     along[edge.points[1]].push_back(edge.points[0]);

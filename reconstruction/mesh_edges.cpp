@@ -24,12 +24,14 @@ std::vector<MeshEdge> mesh_edges(const Triangles& triangles) {
   std::vector<MeshEdge> edges;
   edges.reserve(half.size() / 2);
   for (std::size_t i = 0; i < half.size();) {
-    MeshEdge edge{{half[i].low, half[i].high}, {}, true};
+    MeshEdge edge{{half[i].low, half[i].high}};
     std::size_t end = i;
-    for (; end < half.size() && half[end].low == half[i].low && half[end].high == half[i].high; ++end)
-      edge.triangles.push_back(half[end].triangle);
-    if (end - i == 2) edge.opposite = half[i].ascending != half[i + 1].ascending;
-    edges.push_back(std::move(edge));
+    for (; end < half.size() && half[end].low == half[i].low && half[end].high == half[i].high; ++end) {
+      if (edge.count < 2) edge.triangles[edge.count] = half[end].triangle;
+      ++edge.count;
+    }
+    if (edge.count == 2) edge.opposite = half[i].ascending != half[i + 1].ascending;
+    edges.push_back(edge);
     i = end;
   }
   return edges;

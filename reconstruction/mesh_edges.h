@@ -10,9 +10,10 @@ namespace supine::reconstruction {
 
 /// An undirected edge with the triangles on it.
 struct MeshEdge {
-  std::array<int, 2> points;   ///< ascending
-  std::vector<int> triangles;  ///< one or two on a manifold, ascending
-  bool opposite = true;        ///< two triangles walk it in opposite directions, as a consistent orientation demands
+  std::array<int, 2> points;                ///< ascending
+  std::array<int, 2> triangles = {-1, -1};  ///< the first two, ascending; −1 where there is none
+  int count = 0;         ///< triangles on it: one on a border, two inside, more where it is not a manifold
+  bool opposite = true;  ///< two triangles walk it in opposite directions, as a consistent orientation demands
 };
 
 /// All edges, ordered by their points.

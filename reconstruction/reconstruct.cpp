@@ -5,10 +5,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 
 #include "common/error.h"
 #include "reconstruction/fairing.h"
 #include "reconstruction/mesh_edges.h"
+#include "reconstruction/prongs.h"
 
 namespace supine::reconstruction {
 namespace {
@@ -90,9 +92,56 @@ OrganSurface finish(std::string name, const VoxelSurface& voxels, Eigen::VectorX
   organ.surface = to_patient(std::move(surface), image.grid);
   organ.report = check_surface(organ.surface);
   organ.voxel_volume_mm3 = voxels.voxel_volume_mm3();
+  organ.voxel_mm = image.grid.spacing_mm.maxCoeff();
   organ.voxel_components = static_cast<int>(voxels.piece_volume_mm3.size());
   organ.dropped_pieces = voxels.dropped_pieces;
   organ.dropped_volume_mm3 = voxels.dropped_volume_mm3;
+  return organ;
+}
+
+// A coarser mask of one tissue: blocks of voxels count as in above the share that keeps the volume best.
+LabelImage in_blocks(const LabelImage& image, Tissue tissue, int factor) {
+  LabelImage coarse;
+  coarse.grid = image.grid;
+  coarse.grid.size = (image.grid.size.array() + factor - 1) / factor;
+  coarse.grid.spacing_mm = factor * image.grid.spacing_mm;
+  coarse.grid.origin_mm = image.grid.point(Eigen::Vector3d::Constant(0.5 * (factor - 1)));
+  std::vector<std::uint16_t> share(coarse.grid.count(), 0);
+  for (int k = 0; k < image.grid.size.z(); ++k)
+    for (int j = 0; j < image.grid.size.y(); ++j)
+      for (int i = 0; i < image.grid.size.x(); ++i)
+        share[coarse.grid.index(i / factor, j / factor, k / factor)] +=
+            static_cast<Tissue>(image.at(i, j, k)) == tissue;
+  const int full = factor * factor * factor;
+  std::vector<long> blocks(full + 1, 0);
+  long voxels = 0;
+  for (const std::uint16_t s : share) {
+    ++blocks[s];
+    voxels += s;
+  }
+  int threshold = full + 1;
+  for (long in = 0; threshold > 1 && 2 * in * full + blocks[threshold - 1] * full <= 2 * voxels;
+       in += blocks[threshold])
+    --threshold;
+  coarse.voxels.resize(share.size());
+  for (std::size_t b = 0; b < share.size(); ++b)
+    coarse.voxels[b] = static_cast<std::uint8_t>(share[b] >= threshold ? tissue : Tissue::air);
+  return coarse;
+}
+
+std::optional<OrganSurface> organ_surface(const LabelImage& image, Tissue tissue, const ReconstructOptions& options) {
+  const VoxelSurface fine = voxel_surface(image, only(tissue));
+  if (fine.surface.triangles.rows() == 0) return std::nullopt;
+  const std::string name(segmentation::tissue_names[static_cast<int>(tissue)]);
+  const double excess = static_cast<double>(fine.surface.triangles.rows()) / options.most_organ_triangles;
+  if (excess <= 1) return finish(name, fine, {}, image, options);
+  const LabelImage coarse = in_blocks(image, tissue, static_cast<int>(std::ceil(std::sqrt(excess))));
+  VoxelSurface blocks = voxel_surface(coarse, only(tissue));
+  const double scale = fine.voxel_volume_mm3() / blocks.voxel_volume_mm3();
+  for (double& volume : blocks.piece_volume_mm3) volume *= scale;  // what the blocks miss is given back by the offset
+  OrganSurface organ = finish(name, blocks, {}, coarse, options);
+  organ.voxel_volume_mm3 = fine.voxel_volume_mm3();
+  organ.voxel_components = static_cast<int>(fine.piece_volume_mm3.size());
   return organ;
 }
 
@@ -141,23 +190,25 @@ void ReconstructOptions::check() const {
   if (!(cut.rim_mm > 0)) throw InputError(fmt::format("rim_mm is {}; it must be > 0", cut.rim_mm));
   if (!(smallest_piece_mm3 >= 0))
     throw InputError(fmt::format("smallest_piece_mm3 is {}; it must be >= 0", smallest_piece_mm3));
+  if (!(thinnest_mm >= 0)) throw InputError(fmt::format("thinnest_mm is {}; it must be >= 0", thinnest_mm));
+  if (most_organ_triangles < 1000)
+    throw InputError(fmt::format("most_organ_triangles is {}; it must be >= 1000", most_organ_triangles));
 }
 
 Reconstruction reconstruct(const LabelImage& image, const ReconstructOptions& options) {
   options.check();
   require_tissues(image);
   Reconstruction result;
-  const VoxelSurface breast = voxel_surface(image, meshed_tissues(), options.smallest_piece_mm3);
-  result.breast = finish("breast", breast, regions_of(breast, image, options.cut), image, options);
+  LabelImage without_prongs = image;
+  const double prong_volume_mm3 = turn_prongs_into_muscle(without_prongs, options.thinnest_mm);
+  const VoxelSurface breast = voxel_surface(without_prongs, meshed_tissues(), options.smallest_piece_mm3);
+  result.breast = finish("breast", breast, regions_of(breast, without_prongs, options.cut), without_prongs, options);
+  result.breast.prong_volume_mm3 = prong_volume_mm3;
   result.muscle = reversed_region(result.breast.surface, Region::inner);
   if (result.muscle.triangles.rows() == 0)
     throw InputError("no tissue to be meshed borders on the muscle; check the labels of muscle and of what lies on it");
-  for (const Tissue tissue : organ_tissues) {
-    const VoxelSurface organ = voxel_surface(image, only(tissue));
-    if (organ.surface.triangles.rows() > 0)
-      result.organs.push_back(
-          finish(std::string(segmentation::tissue_names[static_cast<int>(tissue)]), organ, {}, image, options));
-  }
+  for (const Tissue tissue : organ_tissues)
+    if (auto organ = organ_surface(image, tissue, options)) result.organs.push_back(std::move(*organ));
   return result;
 }
 

@@ -16,6 +16,10 @@ struct ReconstructOptions {
   std::optional<double> smooth_mm;
   /// Loose bits of meshed tissue below this are left out of the breast: a solver cannot hold them.
   double smallest_piece_mm3 = 100;
+  /// Prongs of tissue inside the muscle that are thinner than this count as muscle.
+  double thinnest_mm = 3;
+  /// An organ that would have more triangles is made from blocks of voxels; >= 1000.
+  int most_organ_triangles = 300000;
 
   void check() const;  ///< @throws InputError naming option, value and bound
 };
@@ -25,10 +29,12 @@ struct OrganSurface {
   std::string name;             ///< "breast", or the tissue's name
   Surface surface;              ///< closed, manifold, outward, no self-intersections; LPS mm
   SurfaceReport report;         ///< of the surface
-  double voxel_volume_mm3 = 0;  ///< of the voxels it stands for
+  double voxel_volume_mm3 = 0;  ///< of the image's voxels it stands for
   int voxel_components = 0;     ///< pieces of those voxels, joined through faces
   int dropped_pieces = 0;       ///< left out for their size (breast only)
   double dropped_volume_mm3 = 0;
+  double prong_volume_mm3 = 0;  ///< counted as muscle (breast only)
+  double voxel_mm = 0;          ///< largest side of the voxels the surface was made from
   Eigen::Index less_smooth_points =
       0;  ///< points kept nearer to the staircase because the smooth surface crossed itself
 

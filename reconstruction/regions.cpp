@@ -149,7 +149,7 @@ std::vector<Patch> patches_of(const Surface& surface, const std::vector<MeshEdge
                               const Eigen::VectorXi& region) {
   std::vector<std::vector<int>> across(surface.triangles.rows());
   for (const MeshEdge& edge : edges) {
-    if (edge.triangles.size() != 2 || region(edge.triangles[0]) != region(edge.triangles[1])) continue;
+    if (edge.count != 2 || region(edge.triangles[0]) != region(edge.triangles[1])) continue;
     across[edge.triangles[0]].push_back(edge.triangles[1]);
     across[edge.triangles[1]].push_back(edge.triangles[0]);
   }
@@ -171,7 +171,7 @@ std::vector<Patch> patches_of(const Surface& surface, const std::vector<MeshEdge
     patches.push_back(std::move(patch));
   }
   for (const MeshEdge& edge : edges) {
-    if (edge.triangles.size() != 2 || patch_of[edge.triangles[0]] == patch_of[edge.triangles[1]]) continue;
+    if (edge.count != 2 || patch_of[edge.triangles[0]] == patch_of[edge.triangles[1]]) continue;
     const double length = (surface.points.row(edge.points[0]) - surface.points.row(edge.points[1])).norm();
     for (int side = 0; side < 2; ++side)
       patches[patch_of[edge.triangles[side]]].border_mm[region(edge.triangles[1 - side])] += length;
@@ -200,7 +200,7 @@ bool absorb_islands(const Surface& surface, const std::vector<MeshEdge>& edges, 
 bool file_teeth(const std::vector<MeshEdge>& edges, Eigen::VectorXi& region) {
   std::vector<std::array<int, 3>> beside(region.size(), {-1, -1, -1});
   for (const MeshEdge& edge : edges)
-    if (edge.triangles.size() == 2)
+    if (edge.count == 2)
       for (int side = 0; side < 2; ++side) {
         auto& row = beside[edge.triangles[side]];
         *std::find(row.begin(), row.end(), -1) = edge.triangles[1 - side];

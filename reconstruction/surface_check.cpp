@@ -28,7 +28,7 @@ std::vector<int> components_of(const std::vector<MeshEdge>& edges, Eigen::Index 
   std::vector<int> parent(triangle_count);
   std::iota(parent.begin(), parent.end(), 0);
   for (const MeshEdge& edge : edges)
-    for (std::size_t i = 1; i < edge.triangles.size(); ++i) join(parent, edge.triangles[0], edge.triangles[i]);
+    if (edge.count > 1) join(parent, edge.triangles[0], edge.triangles[1]);
   std::vector<int> number(triangle_count, -1);
   int next = 0;
   for (int t = 0; t < triangle_count; ++t) {
@@ -49,9 +49,8 @@ std::vector<int> points_without_one_fan(const Surface& surface, const std::vecto
     return 3 * triangle + corner;
   };
   for (const MeshEdge& edge : edges)
-    for (std::size_t i = 1; i < edge.triangles.size(); ++i)
-      for (const int point : edge.points)
-        join(parent, corner_of(edge.triangles[0], point), corner_of(edge.triangles[i], point));
+    for (const int point : edge.points)
+      if (edge.count > 1) join(parent, corner_of(edge.triangles[0], point), corner_of(edge.triangles[1], point));
   std::vector<int> fans(surface.points.rows(), 0), bad;
   for (int i = 0; i < static_cast<int>(parent.size()); ++i)
     if (find_root(parent, i) == i) ++fans[surface.triangles.data()[i]];
@@ -90,8 +89,8 @@ SurfaceReport check_surface(const Surface& surface) {
   SurfaceReport report;
   const std::vector<MeshEdge> edges = mesh_edges(surface.triangles);
   for (const MeshEdge& edge : edges) {
-    if (edge.triangles.size() == 1) ++report.border_edges;
-    if (edge.triangles.size() > 2 || !edge.opposite) {
+    if (edge.count == 1) ++report.border_edges;
+    if (edge.count > 2 || !edge.opposite) {
       ++report.bad_edges;
       if (report.first_bad_point < 0) report.first_bad_point = edge.points[0];
     }
@@ -132,7 +131,7 @@ void require_solid(const Surface& surface, const std::string& what) {
   if (report.border_edges > 0) {
     int point = -1;
     for (const MeshEdge& edge : mesh_edges(surface.triangles))
-      if (edge.triangles.size() == 1 && point < 0) point = edge.points[0];
+      if (edge.count == 1 && point < 0) point = edge.points[0];
     throw InputError(
         fmt::format("{}: not closed: {} edges belong to one triangle only, the first at {}; close the hole", what,
                     report.border_edges, place(point)));

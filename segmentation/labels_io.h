@@ -2,18 +2,28 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <string>
 
 #include "segmentation/image.h"
 
 namespace supine::segmentation {
 
+/// What the case says about its labels beyond the voxels, carried along as string field data: `cut` (comma list of
+/// excluded, edge, rim) and `rim_mm`.
+using LabelNotes = std::map<std::string, std::string>;
+
 /// Writes labels.vti: points at the voxel centres with the uint8 point array `tissue`; field data `frame` = "LPS",
-/// `unit` = "mm", `tissue_names` (index = value); VTK's direction matrix holds the direction. Same image, same bytes.
+/// `unit` = "mm", `tissue_names` (index = value) and the notes; VTK's direction matrix holds the direction. Same image,
+/// same bytes.
 /// @throws InputError  when the file cannot be written
-void write_labels(const LabelImage& labels, const std::filesystem::path& file);
+void write_labels(const LabelImage& labels, const std::filesystem::path& file, const LabelNotes& notes = {});
 
 /// Reads what write_labels wrote; frame RAS is converted.
 /// @throws InputError  as read_image; also when there is no point array `tissue` or a value is not a Tissue
 LabelImage read_labels(const std::filesystem::path& file);
+
+/// The notes `cut` and `rim_mm` of a .vti, as far as it has them. @throws InputError  as read_image
+LabelNotes read_label_notes(const std::filesystem::path& file);
 
 }  // namespace supine::segmentation

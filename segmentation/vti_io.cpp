@@ -139,7 +139,7 @@ RawImage read_vti(const std::filesystem::path& file) {
 
 }  // namespace formats
 
-void write_labels(const LabelImage& labels, const std::filesystem::path& file) {
+void write_labels(const LabelImage& labels, const std::filesystem::path& file, const LabelNotes& notes) {
   const Grid& grid = labels.grid;
   vtkNew<vtkImageData> data;
   data->SetDimensions(grid.size.x(), grid.size.y(), grid.size.z());
@@ -160,6 +160,7 @@ void write_labels(const LabelImage& labels, const std::filesystem::path& file) {
   names->SetName("tissue_names");
   for (const auto name : tissue_names) names->InsertNextValue(std::string(name));
   data->GetFieldData()->AddArray(names);
+  for (const auto& [key, value] : notes) add_strings(*data, key.c_str(), {value});
   vtkNew<vtkXMLImageDataWriter> writer;
   ErrorCollector errors(*writer);
   writer->SetFileName(file.c_str());
@@ -185,6 +186,15 @@ LabelImage read_labels(const std::filesystem::path& file) {
                       file.string(), value, label_array, tissue_count - 1));
   }
   return labels;
+}
+
+LabelNotes read_label_notes(const std::filesystem::path& file) {
+  vtkNew<vtkXMLImageDataReader> reader;
+  update(*reader, file);
+  LabelNotes notes;
+  for (const char* key : {"cut", "rim_mm"})
+    if (const auto value = field_string(*reader->GetOutput(), key)) notes[key] = *value;
+  return notes;
 }
 
 }  // namespace supine::segmentation

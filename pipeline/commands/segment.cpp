@@ -24,6 +24,14 @@ using segmentation::LabelImage;
 using segmentation::tissue_count;
 using segmentation::tissue_names;
 
+/// The cuts the case allows, as supine-reconstruct reads them from labels.vti.
+segmentation::LabelNotes cut_notes(const AllowedCuts& cut) {
+  std::string list;
+  for (const auto& [name, allowed] : {std::pair("excluded", cut.excluded), {"edge", cut.edge}, {"rim", cut.rim}})
+    if (allowed) list += (list.empty() ? "" : ",") + std::string(name);
+  return {{"cut", list}, {"rim_mm", fmt::format("{}", cut.rim_mm)}};
+}
+
 /// What the tool found out about the labels.
 struct Findings {
   segmentation::TissueCounts voxels;
@@ -86,7 +94,7 @@ class SegmentTool : public Tool {
     if (target.extension() != ".vti")
       throw InputError(fmt::format("-o {}: the label file ends in .vti", target.string()));
     run.progress("writing");
-    segmentation::write_labels(labels, run.output(target));
+    segmentation::write_labels(labels, run.output(target), cut_notes(measured.cut));
     fill(run.figures(target), measured, labels.grid, findings);
     say(run, labels.grid, findings, target);
     return Outcome::done;

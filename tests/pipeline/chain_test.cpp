@@ -17,91 +17,111 @@ using Json = nlohmann::ordered_json;
 
 bool contains(const std::string& text, const std::string& word) { return text.find(word) != std::string::npos; }
 
+/// A case that has been made already, in a folder of its own.
 class Make : public testing::Test {
  protected:
-  Make() { write_small_case(folder_ / "case"); }
+  Make() { run_process({"cp", "-a", small_run().string(), case_folder().string()}); }
 
-  Finished make(const std::vector<std::string>& more = {}, const std::string& interrupt_after = "") {
-    std::vector<std::string> command = {"make",
-                                        "-f",
-                                        std::string(SUPINE_SOURCE_DIR) + "/pipeline/Makefile",
-                                        "BIN=" SUPINE_BIN_DIR,
-                                        "CASE=" + (folder_ / "case").string(),
-                                        "OUT=" + out().string(),
-                                        "TRIANGLES=1200",
-                                        "MAX_DISTANCE_MM=1.5"};
+  Finished make(std::vector<std::string> more = {}, const std::string& interrupt_after = "") {
+    std::vector<std::string> command = make_command(case_folder());
     command.insert(command.end(), more.begin(), more.end());
     return run_process(command, interrupt_after);
   }
-  fs::path out() const { return folder_ / "out"; }
+  fs::path case_folder() const { return folder_ / "case"; }
+  fs::path out() const { return case_folder() / "out"; }
   /// Makes a file newer than everything made so far.
   void touch(const std::string& name) {
-    fs::last_write_time(folder_ / "case" / name, fs::file_time_type::clock::now() + std::chrono::seconds(1));
+    fs::last_write_time(case_folder() / name, fs::file_time_type::clock::now() + std::chrono::seconds(1));
+  }
+  /// Changes a file without make noticing.
+  void rewrite(const std::string& name, const std::string& text) {
+    const auto time = fs::last_write_time(case_folder() / name);
+    write_text(case_folder() / name, text);
+    fs::last_write_time(case_folder() / name, time);
   }
 
   TemporaryFolder folder_;
 };
 
-TEST_F(Make, TakesACaseFromVolumeToComparisonAndThenOnlyRunsWhatChanged) {
-  const Finished first = make();
-  ASSERT_EQ(first.code, 0) << first.err;
+TEST_F(Make, LeavesEveryFileOfTheChainWithItsSidecar) {
   for (const char* name : {"labels.vti", "breast.vtp", "muscle.vtp", "coarse.vtp", "mesh.vtu", "prone.vtu",
                            "undeformed.vtu", "supine.vtu", "comparison.vtp", "scan.vtp"}) {
     EXPECT_TRUE(fs::exists(out() / name)) << name;
     EXPECT_TRUE(fs::exists((out() / name).replace_extension(".json"))) << name;
   }
-  expect_words(first.out, {"RMS", "tetrahedra", "sag"});
-  EXPECT_TRUE(files_in(folder_ / "case/out").empty());
+}
 
-  const Finished second = make();
-  EXPECT_EQ(second.code, 0);
-  EXPECT_FALSE(contains(second.out, "supine-")) << second.out;
+TEST_F(Make, RunsNothingAgainAndPrintsTheFigures) {
+  const Finished finished = make();
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  EXPECT_FALSE(contains(finished.out, "supine-")) << finished.out;
+  expect_words(finished.out, {"RMS", "tetrahedra", "sag", "comparison.vtp"});
+}
 
+TEST_F(Make, RunsOnlyWhatDependsOnTheChange) {
+  touch("supine.ply");
+  const Finished scan = make({"-n"});
+  EXPECT_FALSE(contains(scan.out, "supine-simulate")) << scan.out;
+  expect_words(scan.out, {"supine-compare"});
   touch("model.toml");
-  const Finished third = make();
-  EXPECT_EQ(third.code, 0) << third.err;
-  EXPECT_FALSE(contains(third.out, "supine-tetrahedralise")) << third.out;
-  EXPECT_TRUE(contains(third.out, "supine-simulate"));
-  EXPECT_TRUE(contains(third.out, "supine-compare"));
+  const Finished model = make({"-n"});
+  EXPECT_FALSE(contains(model.out, "supine-tetrahedralise")) << model.out;
+  expect_words(model.out, {"supine-simulate", "supine-compare"});
+  touch("labels.nrrd");
+  expect_words(make({"decimate"}).out, {"supine-segment", "supine-reconstruct", "supine-decimate"});
+}
 
-  const Finished coarser = make({"TRIANGLES=1000", "decimate"});
-  EXPECT_FALSE(contains(coarser.out, "supine-reconstruct")) << coarser.out;
-  EXPECT_TRUE(contains(coarser.out, "supine-decimate"));
+TEST_F(Make, DecimatesAgainWhenAskedForAnotherSize) {
+  const Finished finished = make({"TRIANGLES=700", "decimate"});
+  EXPECT_FALSE(contains(finished.out, "supine-reconstruct")) << finished.out;
+  expect_words(finished.out, {"supine-decimate"});
+}
+
+TEST_F(Make, WritesElsewhereWhenTheCaseIsReadOnly) {
+  fs::remove_all(out());
+  const auto before = files_in(case_folder());
+  const Finished finished = make({"OUT=" + (folder_ / "elsewhere").string(), "segment"});
+  EXPECT_EQ(finished.code, 0) << finished.err;
+  EXPECT_TRUE(fs::exists(folder_ / "elsewhere/labels.vti"));
+  EXPECT_EQ(files_in(case_folder()), before);
 }
 
 TEST_F(Make, SkipsTheComparisonWhereThereIsNoScanAndSaysSo) {
-  write_text(folder_ / "case/case.toml", replaced(small_case_toml(), "surface = \"supine.ply\"\n", ""));
+  rewrite("case.toml", replaced(small_case_toml(), "surface = \"supine.ply\"\n", ""));
+  fs::remove(out() / "comparison.vtp");
   const Finished finished = make();
   EXPECT_EQ(finished.code, 0) << finished.err;
   expect_words(finished.out, {"compare is skipped"});
-  EXPECT_TRUE(fs::exists(out() / "supine.vtu"));
   EXPECT_FALSE(fs::exists(out() / "comparison.vtp"));
   EXPECT_EQ(make({"compare"}).code, 2);
 }
 
 TEST_F(Make, GoesOnAfterAnInterruption) {
+  for (const char* name : {"coarse.vtp", "mesh.vtu", "supine.vtu", "comparison.vtp"}) fs::remove(out() / name);
   const Finished stopped = make({}, "supine-tetrahedralise");
   EXPECT_NE(stopped.code, 0);
+  EXPECT_FALSE(fs::exists(out() / "supine.vtu"));
   for (const std::string& name : files_in(out())) EXPECT_FALSE(contains(name, ".part")) << name;
   const Finished second = make();
   EXPECT_EQ(second.code, 0) << second.err;
-  EXPECT_FALSE(contains(second.out, "supine-segment")) << second.out;
+  EXPECT_FALSE(contains(second.out, "supine-decimate")) << second.out;
   EXPECT_TRUE(fs::exists(out() / "comparison.vtp"));
 }
 
 TEST_F(Make, SaysWhichFileIsMissing) {
-  fs::remove(folder_ / "case/model.toml");
+  fs::remove(case_folder() / "model.toml");
   Finished finished = make();
   EXPECT_EQ(finished.code, 2);
   expect_words(finished.err, {"model.toml", "is not there"});
-  fs::remove(folder_ / "case/case.toml");
+  fs::remove(case_folder() / "case.toml");
   finished = make();
   EXPECT_EQ(finished.code, 2);
   expect_words(finished.err, {"case.toml", "is not there"});
 }
 
 TEST_F(Make, StopsAtBadInput) {
-  write_text(folder_ / "case/case.toml", replaced(small_case_toml(), "muscle = [3]", "muscle = []"));
+  fs::remove_all(out());
+  write_text(case_folder() / "case.toml", replaced(small_case_toml(), "muscle = [3]", "muscle = []"));
   const Finished finished = make();
   EXPECT_EQ(finished.code, 2);
   expect_words(finished.err, {"case.toml:", "muscle"});
@@ -136,6 +156,7 @@ TEST(Tools, OfTheSmallCaseReportWhatOthersRelyOn) {
 std::map<std::string, std::string> bytes_of(const fs::path& folder) {
   std::map<std::string, std::string> bytes;
   for (const std::string& name : files_in(folder)) {
+    if (name.starts_with(".")) continue;
     bytes[name] = read_text(folder / name);
     if (!name.ends_with(".json")) continue;
     Json json = Json::parse(bytes[name]);

@@ -13,7 +13,10 @@ namespace supine::pipeline {
 /// segment, reconstruct, decimate, tetrahedralise, simulate, compare.
 std::vector<std::string> stage_command(const std::string& stage, const std::filesystem::path& folder);
 
-/// Writes the small case into @p folder and takes it through every stage.
+/// The make that takes the case in @p folder as far as its data allow, results in folder/out.
+std::vector<std::string> make_command(const std::filesystem::path& folder);
+
+/// Writes the small case into @p folder and makes it.
 /// @throws std::runtime_error  with what the tool said, when a stage fails
 void make_small_run(const std::filesystem::path& folder);
 

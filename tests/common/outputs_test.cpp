@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "common/outputs.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+
+#include "common/error.h"
+
+namespace supine {
+namespace {
+
+namespace fs = std::filesystem;
+
+class OutputsTest : public ::testing::Test {
+ protected:
+  OutputsTest() { fs::create_directories(folder); }
+  ~OutputsTest() override { fs::remove_all(folder); }
+  static std::string text(const fs::path& file) {
+    std::ifstream stream(file);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  std::size_t files() const { return std::distance(fs::directory_iterator(folder), fs::directory_iterator()); }
+  const fs::path folder = fs::temp_directory_path() / ("outputs_test_" + std::to_string(getpid()));
+};
+
+TEST_F(OutputsTest, FilesAppearTogetherOnCommit) {
+  Outputs outputs(false);
+  std::ofstream(outputs.stage(folder / "a.txt")) << "A";
+  std::ofstream(outputs.stage(folder / "deep" / "b.txt")) << "B";
+  EXPECT_FALSE(fs::exists(folder / "a.txt"));
+  outputs.commit();
+  EXPECT_EQ(text(folder / "a.txt"), "A");
+  EXPECT_EQ(text(folder / "deep" / "b.txt"), "B");
+}
+
+TEST_F(OutputsTest, WithoutCommitNothingIsLeft) {
+  { std::ofstream(Outputs(false).stage(folder / "a.txt")) << "A"; }
+  EXPECT_EQ(files(), 0u);
+}
+
+TEST_F(OutputsTest, ExistingFilesNeedForce) {
+  std::ofstream(folder / "a.txt") << "old";
+  Outputs careful(false);
+  EXPECT_THROW(careful.stage(folder / "a.txt"), InputError);
+  Outputs forced(true);
+  std::ofstream(forced.stage(folder / "a.txt")) << "new";
+  EXPECT_EQ(text(folder / "a.txt"), "old");
+  forced.commit();
+  EXPECT_EQ(text(folder / "a.txt"), "new");
+}
+
+TEST_F(OutputsTest, AFolderThatCannotBeMadeIsRefused) {
+  std::ofstream(folder / "file") << "in the way";
+  Outputs outputs(true);
+  EXPECT_THROW(outputs.stage(folder / "file" / "a.txt"), InputError);
+}
+
+TEST_F(OutputsTest, InterruptRemovesStagedFilesAndEndsWith130) {
+  const pid_t child = fork();
+  if (child == 0) {
+    install_interrupt_handler();
+    Outputs outputs(false);
+    std::ofstream(outputs.stage(folder / "a.txt")) << "A";
+    raise(SIGINT);
+    _exit(1);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_EQ(files(), 0u);
+}
+
+}  // namespace
+}  // namespace supine
