@@ -8,9 +8,11 @@
 #include <CGAL/property_map.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -25,6 +27,8 @@ using Search = CGAL::Orthogonal_k_neighbor_search<Traits>;
 
 constexpr int spacing_neighbours = 6;
 constexpr double least_root = 1e-3;
+constexpr double same_place = 1e-12;  // of the squared spacing: a neighbour there has no direction
+constexpr double same_angle = 1e-6;   // a point of a straight border has its neighbours within π up to rounding
 
 struct Fit {
   Eigen::Vector3d foot, normal;
@@ -104,6 +108,20 @@ PointCloud::~PointCloud() = default;
 PointCloud::PointCloud(PointCloud&&) noexcept = default;
 PointCloud& PointCloud::operator=(PointCloud&&) noexcept = default;
 
+bool PointCloud::one_sided(const Eigen::Vector3d& foot, const Eigen::Vector3d& normal) const {
+  const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+  std::vector<double> angles;
+  for (const auto& [squared, row] : tree_->nearest(foot, neighbours)) {
+    const Eigen::Vector3d offset = tree_->points.row(row).transpose() - foot;
+    const double x = offset.dot(u), y = offset.dot(v);
+    if (x * x + y * y > same_place * spacing_mm_[row] * spacing_mm_[row]) angles.push_back(std::atan2(y, x));
+  }
+  std::sort(angles.begin(), angles.end());
+  double widest_gap = angles.front() + 2 * std::numbers::pi - angles.back();
+  for (std::size_t i = 1; i < angles.size(); ++i) widest_gap = std::max(widest_gap, angles[i] - angles[i - 1]);
+  return widest_gap > std::numbers::pi - same_angle;
+}
+
 PointCloud::Hit PointCloud::closest(const Eigen::Vector3d& query) const {
   const int point = tree_->nearest(query, 1).front().second;
   const Eigen::Vector3d normal = normal_.row(point);
@@ -118,7 +136,8 @@ PointCloud::Hit PointCloud::closest(const Eigen::Vector3d& query) const {
   const double root = std::sqrt(std::max(0.0, 1 - 2 * k * level));  // |n − k w|: 0 only at the centre of the sphere
   if (root < least_root) return {point, nearest, false};
   const double height = 2 * level / (1 + root);
-  return {point, query - height / root * (normal - k * w), false};
+  const Eigen::Vector3d foot = query - height / root * (normal - k * w);
+  return {point, foot, one_sided(foot, normal)};
 }
 
 }  // namespace supine::calibration

@@ -14,7 +14,7 @@ namespace supine::calibration {
 /// points, and unlike the plane alone it is not drawn inward where the surface is curved.
 class PointCloud {
  public:
-  /// A surface is taken to go on this many local spacings beyond its last points.
+  /// Further than this many local spacings from the nearest point, along the surface, there is none: a hole.
   static constexpr double reach_spacings = 2;
 
   static constexpr int neighbours = 18;  ///< about two and a half spacings around
@@ -28,8 +28,8 @@ class PointCloud {
   /// What lies closest to a query point.
   struct Hit {
     int point;                ///< nearest point
-    Eigen::Vector3d closest;  ///< on the local sphere; the nearest point itself beyond the border
-    bool beyond_border;       ///< the nearest point is further off than reach_spacings along the plane
+    Eigen::Vector3d closest;  ///< on the local sphere; further off than reach_spacings the nearest point itself
+    bool beyond_border;       ///< past the last points: further off than reach_spacings, or all neighbours on one side
   };
   Hit closest(const Eigen::Vector3d& query) const;
 
@@ -39,6 +39,9 @@ class PointCloud {
   const Eigen::VectorXd& spacing_mm() const { return spacing_mm_; }
 
  private:
+  // Whether the neighbours of a point of the surface lie within a half-plane around it.
+  bool one_sided(const Eigen::Vector3d& foot, const Eigen::Vector3d& normal) const;
+
   struct Tree;
   std::unique_ptr<Tree> tree_;
   Points foot_;  // where the fit crosses the normal through the neighbours' centre

@@ -25,16 +25,15 @@ class Star {
 
   bool movable(int point) const { return movable_[point]; }
 
-  double smallest_angle_deg(int cell) const {
+  double shape_of(int cell) const {
     Eigen::Matrix<double, 4, 3> x;
     for (int k = 0; k < 4; ++k) x.row(k) = mesh_.points.row(mesh_.cells(cell, k));
-    const auto [low, high] = dihedral_range_deg(x);
-    return std::min(low, 1.2 * (180 - high));  // a needle and a sliver are bad alike
+    return shape_angle_deg(x);
   }
 
   double worst_around(int point) const {
     double worst = 180;
-    for (const int c : cells_[point]) worst = std::min(worst, smallest_angle_deg(c));
+    for (const int c : cells_[point]) worst = std::min(worst, shape_of(c));
     return worst;
   }
 
@@ -86,12 +85,12 @@ class Star {
 
 }  // namespace
 
-void improve_cells(TetMesh& mesh, double wanted_deg) {
+void move_points(TetMesh& mesh, double wanted_deg) {
   Star star(mesh);
   for (int round = 0; round < rounds; ++round) {
     std::vector<int> points;
     for (int c = 0; c < mesh.cells.rows(); ++c) {
-      if (star.smallest_angle_deg(c) >= wanted_deg) continue;
+      if (star.shape_of(c) >= wanted_deg) continue;
       for (int k = 0; k < 4; ++k) {
         if (star.movable(mesh.cells(c, k))) points.push_back(mesh.cells(c, k));
       }

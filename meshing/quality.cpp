@@ -47,6 +47,11 @@ std::pair<double, double> dihedral_range_deg(const CornerPoints& corners) {
   return {low, high};
 }
 
+double shape_angle_deg(const CornerPoints& corners) {
+  const auto [low, high] = dihedral_range_deg(corners);
+  return std::min(low, 1.2 * (180 - high));
+}
+
 double radius_ratio(const CornerPoints& corners) {
   const double v = volume(corners);
   const double area = face_normals(corners).rowwise().norm().sum() / 2;

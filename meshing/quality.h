@@ -13,6 +13,10 @@ namespace supine::meshing {
 /// An inverted or flat tetrahedron gives {0, 180}.
 std::pair<double, double> dihedral_range_deg(const Eigen::Matrix<double, 4, 3>& corners);
 
+/// One number for both ways of being bad: the smaller of the smallest dihedral angle and 1.2 × (180° - the largest
+/// one).
+double shape_angle_deg(const Eigen::Matrix<double, 4, 3>& corners);
+
 /// 3 × inradius / circumradius: 1 for the regular tetrahedron, 0 for a flat one, negative for an inverted one.
 double radius_ratio(const Eigen::Matrix<double, 4, 3>& corners);
 

@@ -15,8 +15,6 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using reconstruction::Surface;
 
-constexpr unsigned int remeshing_iterations = 5;
-
 using FaceRegions = Mesh::Property_map<Mesh::Face_index, int>;
 using EdgeFlags = Mesh::Property_map<Mesh::Edge_index, bool>;
 
@@ -92,7 +90,7 @@ std::vector<Mesh::Face_index> faces_of_level(const Mesh& mesh, int level, double
 
 }  // namespace
 
-Surface remesh(const Surface& surface, double edge_mm, const std::vector<FinePlace>& fine) {
+Surface remesh(const Surface& surface, double edge_mm, const std::vector<FinePlace>& fine, unsigned int iterations) {
   namespace pmp = CGAL::Polygon_mesh_processing;
   RegionMesh work = to_cgal(surface);
   int finest = 0;
@@ -100,8 +98,8 @@ Surface remesh(const Surface& surface, double edge_mm, const std::vector<FinePla
   for (int level = finest; level >= 0; --level) {
     const std::vector<Mesh::Face_index> faces = faces_of_level(work.mesh, level, edge_mm, fine);
     pmp::isotropic_remeshing(faces, edge_mm / std::exp2(level), work.mesh,
-                             pmp::parameters::number_of_iterations(remeshing_iterations)
-                                 .number_of_relaxation_steps(3)
+                             pmp::parameters::number_of_iterations(iterations)
+                                 .number_of_relaxation_steps(iterations > 1 ? 3 : 1)
                                  .edge_is_constrained_map(work.border)
                                  .face_patch_map(work.region)
                                  .relax_constraints(false));

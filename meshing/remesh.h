@@ -16,8 +16,9 @@ struct FinePlace {
 /// Isotropic remeshing with region borders kept, each level of fineness remeshed in its turn, finest first.
 /// @param surface  closed manifold, with regions (or none, then it is one region)
 /// @param edge_mm  edge length away from the fine places, > 0
+/// @param iterations  rounds of splitting, collapsing, flipping and moving; one coarsens, five make good triangles
 /// @return triangles of @p surface's regions; the topology is that of @p surface
 reconstruction::Surface remesh(const reconstruction::Surface& surface, double edge_mm,
-                               const std::vector<FinePlace>& fine);
+                               const std::vector<FinePlace>& fine, unsigned int iterations = 5);
 
 }  // namespace supine::meshing

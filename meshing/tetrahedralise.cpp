@@ -158,7 +158,8 @@ TetMesh tetrahedralise(const Surface& surface, const TetrahedraliseOptions& opti
   }
   TetMesh mesh = assemble(filled, surface);
   drop_unused_points(mesh);
-  improve_cells(mesh);
+  move_points(mesh);
+  if (insert_points(mesh) > 0) move_points(mesh);
   return mesh;
 }
 

@@ -74,6 +74,22 @@ Boundary boundary_of(const Indices& cells) {
   return boundary;
 }
 
+void set_face_cells(TetMesh& mesh) {
+  const auto key = [](const Indices& faces, Eigen::Index f) {
+    std::array<int, 3> corners = {faces(f, 0), faces(f, 1), faces(f, 2)};
+    std::sort(corners.begin(), corners.end());
+    return corners;
+  };
+  std::map<std::array<int, 3>, int> owner;
+  const Boundary boundary = boundary_of(mesh.cells);
+  for (Eigen::Index f = 0; f < boundary.faces.rows(); ++f) owner[key(boundary.faces, f)] = boundary.face_cell[f];
+  mesh.face_cell.resize(mesh.faces.rows());
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
+    const auto found = owner.find(key(mesh.faces, f));
+    mesh.face_cell[f] = found == owner.end() ? -1 : found->second;
+  }
+}
+
 double cell_volume_mm3(const Points& points, const Indices& cells, Eigen::Index c) {
   const Eigen::RowVector3d a = points.row(cells(c, 0));
   const Eigen::RowVector3d u = points.row(cells(c, 1)) - a;

@@ -26,6 +26,10 @@ struct Boundary {
 /// @throws InputError  naming the cells when three of them share a face
 Boundary boundary_of(const Indices& cells);
 
+/// Fills mesh.face_cell from cells and faces: the cell each face is on the boundary of, or -1.
+/// @throws InputError  as boundary_of
+void set_face_cells(TetMesh& mesh);
+
 /// Signed volume of the corner tetrahedron of cell @p c, mm³; > 0 as TetMesh demands.
 double cell_volume_mm3(const Points& points, const Indices& cells, Eigen::Index c);
 

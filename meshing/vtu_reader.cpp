@@ -16,9 +16,6 @@
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLUnstructuredGridReader.h>
 
-#include <map>
-#include <vector>
-
 #include "common/error.h"
 #include "meshing/mesh_check.h"
 #include "meshing/topology.h"
@@ -140,19 +137,7 @@ void VtuReader::read_topology(TetMesh& mesh) const {
       (is_tet ? mesh.cells(c, k) : mesh.faces(c - cells, k)) = static_cast<int>(nodes->GetId(k));
     }
   }
-  std::map<std::array<int, 3>, int> owner;
-  const Boundary boundary = boundary_of(mesh.cells);
-  const auto key = [](const Indices& faces, Eigen::Index f) {
-    std::array<int, 3> corners = {faces(f, 0), faces(f, 1), faces(f, 2)};
-    std::sort(corners.begin(), corners.end());
-    return corners;
-  };
-  for (Eigen::Index f = 0; f < boundary.faces.rows(); ++f) owner[key(boundary.faces, f)] = boundary.face_cell[f];
-  mesh.face_cell = Eigen::VectorXi::Constant(mesh.faces.rows(), -1);
-  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
-    const auto found = owner.find(key(mesh.faces, f));
-    if (found != owner.end()) mesh.face_cell[f] = found->second;
-  }
+  set_face_cells(mesh);
 }
 
 void VtuReader::read_tissue(TetMesh& mesh) const {

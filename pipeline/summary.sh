@@ -41,6 +41,7 @@ for file in "$out"/comparison_*.json; do
 done
 echo
 echo "For ParaView, in $out:"
-for file in labels.vti breast.vtp muscle.vtp coarse.vtp mesh.vtu prone.vtu undeformed.vtu supine.vtu comparison.vtp scan.vtp; do
+for file in labels.vti breast.vtp muscle.vtp coarse.vtp mesh.vtu prone.vtu undeformed.vtu supine.vtu comparison.vtp scan.vtp \
+  prone_tumour.vtp supine_tumour.vtp; do
   if [ -f "$out/$file" ]; then printf '  %s\n' "$file"; fi
 done

@@ -57,7 +57,7 @@ class Refusal {
   const char* what_;
   const char* rule_;
   long count_ = 0;
-  Eigen::Vector3d place_;
+  Eigen::Vector3d place_ = Eigen::Vector3d::Zero();
   std::string_view tissue_;
 };
 

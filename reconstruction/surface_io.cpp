@@ -66,7 +66,7 @@ void declare_from_field_data(vtkPolyData* data, const std::filesystem::path& fil
     auto* text = vtkStringArray::SafeDownCast(data->GetFieldData()->GetAbstractArray(key));
     if (text == nullptr) continue;
     for (vtkIdType i = 0; i < text->GetNumberOfValues(); ++i)
-      read_declaration(std::string(key) + " " + text->GetValue(i), file, declaration);
+      read_declaration(fmt::format("{} {}", key, text->GetValue(i)), file, declaration);
   }
 }
 

@@ -28,7 +28,7 @@ using segmentation::tissue_names;
 segmentation::LabelNotes cut_notes(const AllowedCuts& cut) {
   std::string list;
   for (const auto& [name, allowed] : {std::pair("excluded", cut.excluded), {"edge", cut.edge}, {"rim", cut.rim}})
-    if (allowed) list += (list.empty() ? "" : ",") + std::string(name);
+    if (allowed) list += fmt::format("{}{}", list.empty() ? "" : ",", name);
   return {{"cut", list}, {"rim_mm", fmt::format("{}", cut.rim_mm)}};
 }
 

@@ -42,7 +42,7 @@ TEST_F(HiddenOpen, BarePointsOfTheScanLieOnItWithinItsNoise) {
   const Scan cloud({supine.points, Triangles(0, 3), {}}, model);
   const Comparison result = compare(model, cloud, {});
   EXPECT_LT(result.mae_study_mm, 0.7);
-  EXPECT_GT(result.covered_fraction, 0.95);
+  EXPECT_GT(result.covered_fraction, 0.9);
 }
 
 TEST_F(HiddenOpen, ScanWrittenAsRasIsRefused) {

@@ -6,6 +6,7 @@
 
 #include <cstring>
 #include <limits>
+#include <vector>
 
 #include "calibration/closest_point.h"
 #include "common/error.h"
@@ -127,18 +128,33 @@ TEST(SurfaceDistance, SkipsTrianglesWithoutAreaAndKeepsTheirNeighbours) {
   EXPECT_FALSE(closest.on_border[0]);
 }
 
-TEST(PointCloudDistance, ExactOnAPlaneAndBorderBySpacing) {
-  const auto flat = testing::sheet(0, 40, 20);  // spacing 2
-  Points queries(4, 3);
-  queries << 13.3, 17.1, 5, 20, 21, -7, 43, 20, 1, 47, 20, 1;
+TEST(PointCloudDistance, ExactOnAPlane) {
+  const auto flat = testing::sheet(0, 40, 20);
+  Points queries(3, 3);
+  queries << 13.3, 17.1, 5, 20, 21, -7, 47, 20, 1;  // the last far beside it
   ClosestPoints closest;
   SurfaceDistance(flat.points, Triangles(0, 3)).closest(queries, closest);
   EXPECT_NEAR(closest.distance_mm[0], 5, 1e-12);
   EXPECT_NEAR(closest.distance_mm[1], 7, 1e-12);
-  EXPECT_NEAR(closest.distance_mm[2], 1, 1e-12);
-  EXPECT_NEAR(closest.distance_mm[3], std::hypot(7, 1), 1e-12);
-  EXPECT_FALSE(closest.on_border[0] || closest.on_border[1] || closest.on_border[2]);
-  EXPECT_TRUE(closest.on_border[3]);
+  EXPECT_NEAR(closest.distance_mm[2], std::hypot(7, 1), 1e-12);
+  EXPECT_TRUE(closest.point.row(1).isApprox(Eigen::RowVector3d(20, 21, 0), 1e-12));
+}
+
+TEST(PointCloudDistance, BorderIsWhereThePointsEnd) {
+  auto flat = testing::sheet(0, 40, 20);  // spacing 2, with a hole of radius 9
+  std::vector<int> kept;
+  for (int i = 0; i < flat.points.rows(); ++i) {
+    if ((flat.points.row(i) - Eigen::RowVector3d(20, 20, 0)).norm() > 9) kept.push_back(i);
+  }
+  const SurfaceDistance cloud(flat.points(kept, Eigen::all), Triangles(0, 3));
+  // Inside; one spacing inside the border; on it; outside by less than a spacing; in the hole near its edge; its
+  // middle.
+  Points queries(6, 3);
+  queries << 7.3, 5.1, 4, 38.1, 20.3, 4, 40, 20.3, 4, 40.9, 20.3, 4, 28, 20.3, 4, 20, 20, 4;
+  ClosestPoints closest;
+  cloud.closest(queries, closest);
+  const bool beyond[6] = {false, false, true, true, true, true};
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(closest.on_border[i], beyond[i]) << i;
 }
 
 TEST(PointCloudDistance, SphereErrorFallsFasterThanTheSquareOfTheSpacing) {

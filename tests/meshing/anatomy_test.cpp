@@ -15,6 +15,11 @@
 namespace supine {
 namespace {
 
+const meshing::Anatomy& left_dome() {
+  static const meshing::Anatomy anatomy = meshing::compute_anatomy(testing::dome_mesh(), "left");
+  return anatomy;
+}
+
 TEST(Anatomy, DomeOnACylinder) {
   const testing::DomeOptions options;
   for (const int rings : {6, 12}) {
@@ -44,7 +49,7 @@ TEST(Anatomy, WithoutARimTheFootIsTheEdge) {
 }
 
 TEST(Anatomy, LateralOfARightBreastIsMirrored) {
-  const auto left = meshing::compute_anatomy(testing::dome_mesh(), "left");
+  const auto& left = left_dome();
   const auto right = meshing::compute_anatomy(testing::dome_mesh(), "right");
   EXPECT_LT((left.lateral + right.lateral).norm(), 1e-12);
   EXPECT_EQ(left.head, right.head);
@@ -54,7 +59,7 @@ TEST(Anatomy, TurnsWithTheBody) {
   const auto mesh = testing::dome_mesh();
   const Eigen::Matrix3d rotation = Eigen::AngleAxisd(0.35, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   const Eigen::Vector3d shift(60, -20, 900);
-  const auto straight = meshing::compute_anatomy(mesh, "left");
+  const auto& straight = left_dome();
   const auto turned = meshing::compute_anatomy(testing::moved(mesh, rotation, shift), "left");
   EXPECT_NEAR(turned.foot_radius_mm, straight.foot_radius_mm, 0.3);
   EXPECT_LT((turned.foot_centre_mm - rotation * straight.foot_centre_mm - shift).norm(), 0.3);
@@ -64,14 +69,15 @@ TEST(Anatomy, TurnsWithTheBody) {
 
 TEST(Anatomy, LinearAndQuadraticMeshHaveTheSame) {
   const auto mesh = testing::dome_mesh({.rings = 6});
-  const auto linear = meshing::compute_anatomy(mesh, "left"), quadratic = meshing::compute_anatomy(meshing::to_quadratic(mesh), "left");
+  const auto linear = meshing::compute_anatomy(mesh, "left"),
+             quadratic = meshing::compute_anatomy(meshing::to_quadratic(mesh), "left");
   EXPECT_DOUBLE_EQ(linear.foot_radius_mm, quadratic.foot_radius_mm);
   EXPECT_EQ(quadratic.q.rows(), quadratic.thickness_mm.size());
 }
 
 TEST(Anatomy, ThicknessAndNormalsAreThoseOfTheMuscle) {
   const auto mesh = testing::dome_mesh();
-  const auto anatomy = meshing::compute_anatomy(mesh, "left");
+  const auto& anatomy = left_dome();
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
     if (mesh.region[f] != 1) continue;
     EXPECT_NEAR(anatomy.thickness_mm[mesh.faces(f, 0)], 0, 0.1);
@@ -120,7 +126,7 @@ TEST(Anatomy, DistanceFromTheFootIsThatOfAnEllipse) {
 }
 
 TEST(Anatomy, AreasAreNamedAboutTheNipple) {
-  const auto anatomy = meshing::compute_anatomy(testing::dome_mesh(), "left");
+  const auto& anatomy = left_dome();
   EXPECT_EQ(anatomy.area_name({0, 0}), "nipple area");
   EXPECT_EQ(anatomy.area_name({0.5, 0.5}), "upper outer");
   EXPECT_EQ(anatomy.area_name({0.5, -0.5}), "lower outer");
@@ -144,7 +150,9 @@ TEST(Anatomy, LigamentRingLiesAtTheFoot) {
   EXPECT_NEAR(area, 2 * 3.14159 * 64 * 12, 0.25 * 2 * 3.14159 * 64 * 12);
 }
 
-TEST(Anatomy, RefusesAnotherSide) { EXPECT_THROW(meshing::compute_anatomy(testing::dome_mesh({.rings = 4}), "both"), InputError); }
+TEST(Anatomy, RefusesAnotherSide) {
+  EXPECT_THROW(meshing::compute_anatomy(testing::dome_mesh({.rings = 4}), "both"), InputError);
+}
 
 TEST(Anatomy, RefusesAMeshWithoutInnerFaces) {
   auto mesh = testing::dome_mesh({.rings = 4});

@@ -18,7 +18,12 @@ constexpr double muscle_radius_mm = 145;
 constexpr double rim_mm = 80;  // of the sheet, along the arc
 
 testing::DomeOptions dome(double radius_mm) {
-  return {.foot_radius_mm = 64, .rim_factor = rim_mm / 64, .muscle_radius_mm = radius_mm, .rings = 4, .layers = 1, .muscle_rings = 60};
+  return {.foot_radius_mm = 64,
+          .rim_factor = rim_mm / 64,
+          .muscle_radius_mm = radius_mm,
+          .rings = 4,
+          .layers = 1,
+          .muscle_rings = 60};
 }
 
 Eigen::Matrix<double, 2, 3> box_of(const Points& points) {
@@ -29,6 +34,11 @@ Eigen::Matrix<double, 2, 3> box_of(const Points& points) {
 }
 
 meshing::MuscleDistance fit(const meshing::TetMesh& mesh) { return {mesh.muscle, box_of(mesh.points)}; }
+
+const meshing::MuscleDistance& cylinder() {
+  static const meshing::MuscleDistance distance = fit(testing::dome_mesh(dome(muscle_radius_mm)));
+  return distance;
+}
 
 // The point at arc length s and height h over the cylinder (dome_mesh's frame).
 Eigen::Vector3d over_cylinder(double s, double z, double h) {
@@ -68,7 +78,7 @@ TEST(MuscleDistance, PlaneIsExactEverywhere) {
 }
 
 TEST(MuscleDistance, CylinderIsReproducedOnAndNearTheSheet) {
-  const auto distance = fit(testing::dome_mesh(dome(muscle_radius_mm)));
+  const auto& distance = cylinder();
   for (const double ring : {0.0, 20.0, 40.0, 60.0, 75.0, rim_mm}) {
     for (const double h : {0.0, 5.0, 10.0}) {
       const Errors errors = ring_errors(distance, ring, h);
@@ -81,7 +91,7 @@ TEST(MuscleDistance, CylinderIsReproducedOnAndNearTheSheet) {
 }
 
 TEST(MuscleDistance, CylinderGoesOnPastTheRim) {
-  const auto distance = fit(testing::dome_mesh(dome(muscle_radius_mm)));
+  const auto& distance = cylinder();
   EXPECT_LT(ring_errors(distance, rim_mm + 20, 0).value_mm, 1.0);
   EXPECT_LT(ring_errors(distance, rim_mm + 20, 10).value_mm, 1.0);
   const Errors far = ring_errors(distance, rim_mm + 40, 0);  // a plane would miss by 5.3 mm
@@ -116,11 +126,12 @@ TEST(MuscleDistance, UncorrelatedRoughnessIsSmoothed) {
 }
 
 TEST(MuscleDistance, SlopeAndCurvatureAreThoseOfTheValue) {
-  const auto distance = fit(testing::dome_mesh(dome(muscle_radius_mm)));
+  const auto& distance = cylinder();
   std::mt19937 generator(3);
   std::uniform_real_distribution<double> any(-1, 1);
-  for (const Eigen::Vector3d& at : {Eigen::Vector3d(10, -5, 20), Eigen::Vector3d(-95, 30, 10), Eigen::Vector3d(200, -90, 10),
-                                    Eigen::Vector3d(-150, 100, 200)}) {  // the last two lie outside the box
+  for (const Eigen::Vector3d& at :
+       {Eigen::Vector3d(10, -5, 20), Eigen::Vector3d(-95, 30, 10), Eigen::Vector3d(200, -90, 10),
+        Eigen::Vector3d(-150, 100, 200)}) {  // the last two lie outside the box
     const Eigen::Vector3d direction = Eigen::Vector3d(any(generator), any(generator), any(generator)).normalized();
     const auto here = distance.at(at);
     EXPECT_NEAR(distance.value(at), here.value_mm, 1e-12 * 100);
@@ -143,7 +154,7 @@ TEST(MuscleDistance, TurnsAndMovesWithTheSheet) {
   const meshing::TetMesh mesh = testing::dome_mesh(dome(muscle_radius_mm));
   const Eigen::Matrix3d rotation = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
   const Eigen::Vector3d shift(120, -40, 300);
-  const auto straight = fit(mesh);
+  const auto& straight = cylinder();
   const auto turned = fit(testing::moved(mesh, rotation, shift));
   for (const double ring : {0.0, 40.0, 75.0}) {
     for (const double h : {-5.0, 0.0, 10.0, 40.0}) {

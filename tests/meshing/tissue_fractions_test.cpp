@@ -28,7 +28,8 @@ LabelImage half_space(double spacing, double split) {
     for (int j = 0; j < n; ++j) {
       for (int i = 0; i < n; ++i) {
         const bool gland = (i + 0.5) * spacing < split;
-        image.at(i + margin, j + margin, k + margin) = static_cast<std::uint8_t>(gland ? Tissue::gland : Tissue::adipose);
+        image.at(i + margin, j + margin, k + margin) =
+            static_cast<std::uint8_t>(gland ? Tissue::gland : Tissue::adipose);
       }
     }
   }
@@ -75,7 +76,8 @@ TEST(TissueFractions, ObliqueGridsAreRead) {
   image.grid.direction = rotation;
   image.grid.origin_mm = rotation * image.grid.origin_mm + Eigen::Vector3d(5, 6, 7);
   meshing::assign_tissue(turned, image);
-  EXPECT_LT((mesh.fraction - turned.fraction).cwiseAbs().maxCoeff(), 0.05);  // points on voxel borders may fall either way
+  EXPECT_LT((mesh.fraction - turned.fraction).cwiseAbs().maxCoeff(),
+            0.05);  // points on voxel borders may fall either way
 }
 
 TEST(TissueFractions, RefusesLabelsOfAnotherPlace) {

@@ -54,7 +54,8 @@ TEST(Quadratic, KeepsVolumeSharesMiddlesAndPassesTheCheck) {
   EXPECT_NO_THROW(meshing::check_mesh(quadratic));
   for (int e = 0; e < 6; ++e) {
     const auto [a, b] = meshing::tet_edges[e];
-    const Eigen::RowVector3d middle = (quadratic.points.row(quadratic.cells(0, a)) + quadratic.points.row(quadratic.cells(0, b))) / 2;
+    const Eigen::RowVector3d middle =
+        (quadratic.points.row(quadratic.cells(0, a)) + quadratic.points.row(quadratic.cells(0, b))) / 2;
     EXPECT_EQ((quadratic.points.row(quadratic.cells(0, 4 + e)) - middle).norm(), 0);
   }
 }
