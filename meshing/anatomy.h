@@ -13,19 +13,22 @@ namespace supine::meshing {
 
 /// The anatomical frame of one breast, computed once per case from the imaged (prone) mesh and the muscle.
 struct Anatomy {
-  std::string side;                     ///< left or right
-  Eigen::Vector3d outward;              ///< unit; mean outward normal of the muscle under the mound
-  Eigen::Vector3d lateral;              ///< unit, orthogonal to outward; toward the patient's own outer side (+x LPS for left)
-  Eigen::Vector3d head;                 ///< unit, orthogonal to both; toward the head
-  Eigen::Vector3d foot_centre_mm;       ///< on the muscle, centre of the mound's footprint
-  double foot_radius_mm = 0;            ///< mean radius of the foot: where the tissue over the muscle has come down to its rim thickness
-  double rim_thickness_mm = 0;          ///< of the tissue over the muscle outside the foot
-  double mound_height_mm = 0;           ///< largest thickness over the muscle
-  Eigen::VectorXd foot_fourier;         ///< foot radius at azimuth θ (from lateral toward head): c0 + Σ_m c_m cos mθ + s_m sin mθ, stored c0 c1 s1 c2 s2 …, mm
-  Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor> q;  ///< #points; (lateral, head) from the foot's centre over foot_radius_mm
-  Points muscle_normal;                 ///< #points by 3, unit outward muscle normal (∇φ) at each imaged point
-  Eigen::VectorXd thickness_mm;         ///< #points; φ at each imaged point: height over the muscle
-  int nipple_point = -1;                ///< skin point furthest from the muscle within the mound, or where the nipple tissue is
+  std::string side;         ///< left or right
+  Eigen::Vector3d outward;  ///< unit; mean outward normal of the muscle under the mound
+  Eigen::Vector3d lateral;  ///< unit, orthogonal to outward; toward the patient's own outer side (+x LPS for left)
+  Eigen::Vector3d head;     ///< unit, orthogonal to both; toward the head
+  Eigen::Vector3d foot_centre_mm;  ///< on the muscle, centre of the mound's footprint
+  double foot_radius_mm =
+      0;  ///< mean radius of the foot: where the tissue over the muscle has come down to its rim thickness
+  double rim_thickness_mm = 0;  ///< of the tissue over the muscle outside the foot
+  double mound_height_mm = 0;   ///< largest thickness over the muscle
+  Eigen::VectorXd foot_fourier;  ///< foot radius at azimuth θ (from lateral toward head): c0 + Σ_m c_m cos mθ + s_m sin
+                                 ///< mθ, stored c0 c1 s1 c2 s2 …, mm
+  Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor>
+      q;                         ///< #points; (lateral, head) from the foot's centre over foot_radius_mm
+  Points muscle_normal;          ///< #points by 3, unit outward muscle normal (∇φ) at each imaged point
+  Eigen::VectorXd thickness_mm;  ///< #points; φ at each imaged point: height over the muscle
+  int nipple_point = -1;  ///< skin point furthest from the muscle within the mound, or where the nipple tissue is
   std::shared_ptr<const MuscleDistance> muscle;
 
   /// Radius of the foot at azimuth @p theta (rad, from lateral toward head), mm.

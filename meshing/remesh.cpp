@@ -4,7 +4,9 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/remesh.h>
 #include <CGAL/Surface_mesh.h>
+#include <CGAL/boost/graph/Euler_operations.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +16,10 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using reconstruction::Surface;
+
+// Where levels of fineness meet and where a region ends in a tip, remeshing leaves needles.
+constexpr double needle_angle = 0.2, bad_angle = 0.4;  // rad
+constexpr double largest_bend_cosine = 0.8;
 
 using FaceRegions = Mesh::Property_map<Mesh::Face_index, int>;
 using EdgeFlags = Mesh::Property_map<Mesh::Edge_index, bool>;
@@ -65,13 +71,11 @@ Surface from_cgal(RegionMesh& from, bool with_regions) {
   return surface;
 }
 
-Eigen::Vector3d centroid(const Mesh& mesh, Mesh::Face_index face) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Mesh::Vertex_index v : mesh.vertices_around_face(mesh.halfedge(face))) {
-    const Kernel::Point_3& p = mesh.point(v);
-    sum += Eigen::Vector3d(p.x(), p.y(), p.z());
-  }
-  return sum / 3;
+using Half = Mesh::Halfedge_index;
+
+Eigen::Vector3d position(const Mesh& mesh, Mesh::Vertex_index v) {
+  const Kernel::Point_3& p = mesh.point(v);
+  return {p.x(), p.y(), p.z()};
 }
 
 // Faces that no finer place claims: a place of level n claims what lies within twice its own edge length.
@@ -79,13 +83,77 @@ std::vector<Mesh::Face_index> faces_of_level(const Mesh& mesh, int level, double
                                              const std::vector<FinePlace>& fine) {
   std::vector<Mesh::Face_index> faces;
   for (const Mesh::Face_index face : mesh.faces()) {
-    const Eigen::Vector3d at = centroid(mesh, face);
+    const Half half = mesh.halfedge(face);
+    const Eigen::Vector3d at = (position(mesh, mesh.source(half)) + position(mesh, mesh.target(half)) +
+                                position(mesh, mesh.target(mesh.next(half)))) /
+                               3;
     const bool claimed = std::any_of(fine.begin(), fine.end(), [&](const FinePlace& place) {
       return place.level > level && (place.point_mm - at).norm() < 2 * edge_mm / std::exp2(level + 1);
     });
     if (!claimed) faces.push_back(face);
   }
   return faces;
+}
+
+double smallest_angle(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  const auto at = [](const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& r) {
+    return std::atan2((q - p).cross(r - p).norm(), (q - p).dot(r - p));
+  };
+  return std::min({at(a, b, c), at(b, c, a), at(c, a, b)});
+}
+
+double smallest_angle(const Mesh& mesh, Mesh::Face_index face) {
+  const Half half = mesh.halfedge(face);
+  return smallest_angle(position(mesh, mesh.source(half)), position(mesh, mesh.target(half)),
+                        position(mesh, mesh.target(mesh.next(half))));
+}
+
+// A needle along a region border goes to the region across its longest border edge: the border moves by its width.
+void give_needles_away(RegionMesh& work) {
+  Mesh& mesh = work.mesh;
+  for (const Mesh::Face_index face : mesh.faces()) {
+    if (smallest_angle(mesh, face) > needle_angle) continue;
+    Half longest;
+    double longest_mm = 0;
+    for (const Half half : mesh.halfedges_around_face(mesh.halfedge(face))) {
+      const double length = (position(mesh, mesh.source(half)) - position(mesh, mesh.target(half))).norm();
+      if (!work.border[mesh.edge(half)] || length <= longest_mm) continue;
+      longest = half;
+      longest_mm = length;
+    }
+    if (longest_mm == 0) continue;
+    work.region[face] = work.region[mesh.face(mesh.opposite(longest))];
+    for (const Half half : mesh.halfedges_around_face(mesh.halfedge(face)))
+      work.border[mesh.edge(half)] = work.region[face] != work.region[mesh.face(mesh.opposite(half))];
+  }
+}
+
+// Whether turning the edge between its two triangles makes the smallest angle larger and bends the surface little.
+bool flip_helps(const Mesh& mesh, Half half) {
+  const Half opposite = mesh.opposite(half);
+  const Mesh::Vertex_index left = mesh.target(mesh.next(half)), right = mesh.target(mesh.next(opposite));
+  if (mesh.halfedge(left, right).is_valid() || left == right) return false;
+  const Eigen::Vector3d a = position(mesh, mesh.source(half)), b = position(mesh, mesh.target(half)),
+                        c = position(mesh, left), d = position(mesh, right);
+  const double before = std::min(smallest_angle(a, b, c), smallest_angle(b, a, d));
+  const double after = std::min(smallest_angle(a, d, c), smallest_angle(d, b, c));
+  if (before > bad_angle || after <= before + 0.01) return false;
+  const Eigen::Vector3d old_normal = ((b - a).cross(c - a) + (a - b).cross(d - b)).normalized();
+  return (d - a).cross(c - a).normalized().dot(old_normal) > largest_bend_cosine &&
+         (b - d).cross(c - d).normalized().dot(old_normal) > largest_bend_cosine;
+}
+
+void flip_bad_edges(RegionMesh& work) {
+  bool flipped = true;
+  for (int pass = 0; pass < 10 && flipped; ++pass) {
+    flipped = false;
+    for (const Mesh::Edge_index edge : work.mesh.edges()) {
+      const Half half = work.mesh.halfedge(edge);
+      if (work.border[edge] || !flip_helps(work.mesh, half)) continue;
+      CGAL::Euler::flip_edge(half, work.mesh);
+      flipped = true;
+    }
+  }
 }
 
 }  // namespace
@@ -103,6 +171,10 @@ Surface remesh(const Surface& surface, double edge_mm, const std::vector<FinePla
                                  .edge_is_constrained_map(work.border)
                                  .face_patch_map(work.region)
                                  .relax_constraints(false));
+  }
+  for (int round = 0; round < 3; ++round) {
+    give_needles_away(work);
+    flip_bad_edges(work);
   }
   return from_cgal(work, surface.region.size() > 0);
 }

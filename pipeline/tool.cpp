@@ -8,6 +8,7 @@
 #include <new>
 
 #include "common/error.h"
+#include "pipeline/blas_kernels.h"
 #include "pipeline/provenance.h"
 
 extern "C" void openblas_set_num_threads(int threads);
@@ -66,6 +67,7 @@ int complain(const Tool& tool, std::string_view message, int code) {
 }  // namespace
 
 int tool_main(Tool& tool, int argc, char** argv) {
+  use_fitting_blas_kernels(argv);
   install_interrupt_handler();
   CLI::App app(tool.summary(), tool.name());
   CommonOptions common;

@@ -19,33 +19,57 @@ using segmentation::LabelImage;
 using segmentation::Tissue;
 
 constexpr double default_smooth_voxels = 0.75;
-constexpr double largest_offset_voxels = 0.3;
+constexpr double largest_offset_voxels = 0.5;  // fairing cannot shrink by more
+constexpr double negligible_volume = 1e-4;
 constexpr Tissue organ_tissues[] = {Tissue::gland, Tissue::tumour, Tissue::nipple, Tissue::vessel};
 
-// Moves every piece along its normals until it has the volume of its voxels.
+struct PieceSizes {
+  std::vector<double> volume_mm3, area_mm2;
+};
+
+PieceSizes measure_pieces(const VoxelSurface& voxels, const Surface& surface) {
+  PieceSizes sizes{std::vector<double>(voxels.piece_volume_mm3.size(), 0.0), {}};
+  sizes.area_mm2 = sizes.volume_mm3;
+  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
+    const int piece = voxels.piece(surface.triangles(t, 0));
+    const Eigen::RowVector3d a = surface.points.row(surface.triangles(t, 0)),
+                             b = surface.points.row(surface.triangles(t, 1)),
+                             c = surface.points.row(surface.triangles(t, 2));
+    sizes.volume_mm3[piece] += a.dot(b.cross(c)) / 6;
+    sizes.area_mm2[piece] += 0.5 * (b - a).cross(c - a).norm();
+  }
+  return sizes;
+}
+
+void offset_pieces(const VoxelSurface& voxels, const std::vector<double>& step_mm, Surface& surface) {
+  const Points normals = point_normals(surface.points, surface.triangles);
+  for (Eigen::Index p = 0; p < normals.rows(); ++p) surface.points.row(p) += step_mm[voxels.piece(p)] * normals.row(p);
+}
+
+// Moves every piece along its normals until it has the volume of its voxels, as far as the bound allows; what is then
+// missing of the whole is made up by all pieces that are not at the bound.
 void restore_volume(const VoxelSurface& voxels, double bound_mm, Surface& surface) {
   const std::size_t pieces = voxels.piece_volume_mm3.size();
-  std::vector<double> offset_mm(pieces, 0.0);
+  std::vector<double> offset_mm(pieces, 0.0), step_mm(pieces, 0.0);
   for (int round = 0; round < 3; ++round) {
-    std::vector<double> volume(pieces, 0.0), area(pieces, 0.0);
-    for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
-      const int piece = voxels.piece(surface.triangles(t, 0));
-      const Eigen::RowVector3d a = surface.points.row(surface.triangles(t, 0)),
-                               b = surface.points.row(surface.triangles(t, 1)),
-                               c = surface.points.row(surface.triangles(t, 2));
-      volume[piece] += a.dot(b.cross(c)) / 6;
-      area[piece] += 0.5 * (b - a).cross(c - a).norm();
-    }
-    std::vector<double> step(pieces, 0.0);
+    const PieceSizes sizes = measure_pieces(voxels, surface);
     for (std::size_t i = 0; i < pieces; ++i) {
-      if (area[i] <= 0) continue;
-      const double wanted = offset_mm[i] + (voxels.piece_volume_mm3[i] - volume[i]) / area[i];
-      step[i] = std::clamp(wanted, -bound_mm, bound_mm) - offset_mm[i];
-      offset_mm[i] += step[i];
+      const double wanted = offset_mm[i] + (voxels.piece_volume_mm3[i] - sizes.volume_mm3[i]) / sizes.area_mm2[i];
+      step_mm[i] = std::clamp(wanted, -bound_mm, bound_mm) - offset_mm[i];
+      offset_mm[i] += step_mm[i];
     }
-    const Points normals = point_normals(surface.points, surface.triangles);
-    for (Eigen::Index p = 0; p < normals.rows(); ++p) surface.points.row(p) += step[voxels.piece(p)] * normals.row(p);
+    offset_pieces(voxels, step_mm, surface);
   }
+  const PieceSizes sizes = measure_pieces(voxels, surface);
+  double missing = voxels.voxel_volume_mm3(), area = 0;
+  for (std::size_t i = 0; i < pieces; ++i) {
+    missing -= sizes.volume_mm3[i];
+    if (std::abs(offset_mm[i]) < bound_mm) area += sizes.area_mm2[i];
+  }
+  if (area <= 0 || std::abs(missing) < negligible_volume * voxels.voxel_volume_mm3()) return;
+  const double common_mm = std::clamp(missing / area, -0.5 * bound_mm, 0.5 * bound_mm);
+  for (std::size_t i = 0; i < pieces; ++i) step_mm[i] = std::abs(offset_mm[i]) < bound_mm ? common_mm : 0;
+  offset_pieces(voxels, step_mm, surface);
 }
 
 // Halves the displacement from the staircase around crossings until there are none. @return points that were held back
@@ -91,6 +115,7 @@ OrganSurface finish(std::string name, const VoxelSurface& voxels, Eigen::VectorX
   organ.less_smooth_points = remove_crossings(voxels.surface.points, surface);
   organ.surface = to_patient(std::move(surface), image.grid);
   organ.report = check_surface(organ.surface);
+  organ.self_intersections = self_intersections(organ.surface).size();
   organ.voxel_volume_mm3 = voxels.voxel_volume_mm3();
   organ.voxel_mm = image.grid.spacing_mm.maxCoeff();
   organ.voxel_components = static_cast<int>(voxels.piece_volume_mm3.size());

@@ -33,8 +33,9 @@ struct OrganSurface {
   int voxel_components = 0;     ///< pieces of those voxels, joined through faces
   int dropped_pieces = 0;       ///< left out for their size (breast only)
   double dropped_volume_mm3 = 0;
-  double prong_volume_mm3 = 0;  ///< counted as muscle (breast only)
-  double voxel_mm = 0;          ///< largest side of the voxels the surface was made from
+  double prong_volume_mm3 = 0;         ///< counted as muscle (breast only)
+  double voxel_mm = 0;                 ///< largest side of the voxels the surface was made from
+  std::size_t self_intersections = 0;  ///< counted on the surface; 0
   Eigen::Index less_smooth_points =
       0;  ///< points kept nearer to the staircase because the smooth surface crossed itself
 
@@ -50,8 +51,9 @@ struct Reconstruction {
 /// Makes the surfaces of a label volume.
 ///
 /// Marching cubes on the labels, regions from the voxel beyond, fairing within half a voxel (see fair()), and a normal
-/// offset (at most 0.3 voxels) that gives every piece the volume of its voxels. Where the result crosses itself it is
-/// taken back toward the staircase, which does not.
+/// offset (at most half a voxel) that gives every piece the volume of its voxels; what pieces thinner than a voxel lack
+/// is given to the others, within a quarter of a voxel. Where the result crosses itself it is taken back toward the
+/// staircase, which does not.
 /// @throws InputError  no tissue to mesh, no muscle, no part of the tissue on the muscle, or a cut that is not allowed
 ///   (see regions_of)
 Reconstruction reconstruct(const segmentation::LabelImage& image, const ReconstructOptions& options);

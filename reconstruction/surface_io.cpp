@@ -2,10 +2,13 @@
 #include "reconstruction/surface_io.h"
 
 #include <fmt/core.h>
+#include <vtkAlgorithm.h>
+#include <vtkCallbackCommand.h>
 #include <vtkCellArray.h>
 #include <vtkCellData.h>
 #include <vtkCleanPolyData.h>
 #include <vtkDataArray.h>
+#include <vtkExecutive.h>
 #include <vtkFieldData.h>
 #include <vtkIntArray.h>
 #include <vtkNew.h>
@@ -16,10 +19,10 @@
 #include <vtkSTLReader.h>
 #include <vtkSmartPointer.h>
 #include <vtkStringArray.h>
-#include <vtkStringOutputWindow.h>
 #include <vtkTriangleFilter.h>
 #include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
+#include <vtkXMLReader.h>
 
 #include <algorithm>
 #include <cmath>
@@ -31,33 +34,49 @@
 namespace supine::reconstruction {
 namespace {
 
-// Keeps what VTK would print, so that it can become an error message.
-class CollectedVtkText {
+// Keeps what VTK's algorithms would print, so that it can become an error message.
+class VtkErrors {
  public:
-  CollectedVtkText() : before_(vtkOutputWindow::GetInstance()) { vtkOutputWindow::SetInstance(window_); }
-  CollectedVtkText(const CollectedVtkText&) = delete;
-  CollectedVtkText& operator=(const CollectedVtkText&) = delete;
-  ~CollectedVtkText() { vtkOutputWindow::SetInstance(before_); }
+  explicit VtkErrors(vtkAlgorithm& algorithm) : algorithm_(algorithm) {
+    command_->SetCallback([](vtkObject*, unsigned long, void* client, void* text) {
+      auto& message = *static_cast<std::string*>(client);
+      if (message.empty() && text != nullptr) message = static_cast<const char*>(text);
+    });
+    command_->SetClientData(&message_);
+    algorithm.AddObserver(vtkCommand::ErrorEvent, command_);
+    algorithm.GetExecutive()->AddObserver(vtkCommand::ErrorEvent, command_);
+    if (auto* xml = vtkXMLReader::SafeDownCast(&algorithm)) {
+      xml->SetReaderErrorObserver(command_);
+      xml->SetParserErrorObserver(command_);
+    }
+  }
+  VtkErrors(const VtkErrors&) = delete;
+  VtkErrors& operator=(const VtkErrors&) = delete;
+  ~VtkErrors() {
+    algorithm_.RemoveAllObservers();
+    algorithm_.GetExecutive()->RemoveAllObservers();
+  }
+  bool any() const { return !message_.empty() || algorithm_.GetErrorCode() != 0; }
   std::string text() const {
-    std::string text = window_->GetOutput();
+    std::string text = message_;
     std::replace(text.begin(), text.end(), '\n', ' ');
     return text;
   }
 
  private:
-  vtkSmartPointer<vtkOutputWindow> before_;
-  vtkNew<vtkStringOutputWindow> window_;
+  vtkAlgorithm& algorithm_;
+  std::string message_;
+  vtkNew<vtkCallbackCommand> command_;
 };
 
 template <class Reader>
 vtkSmartPointer<vtkPolyData> run_reader(const std::filesystem::path& file) {
   vtkNew<Reader> reader;
   reader->SetFileName(file.c_str());
-  const CollectedVtkText said;
+  const VtkErrors errors(*reader);
   reader->Update();
   vtkSmartPointer<vtkPolyData> data = reader->GetOutput();
-  if (reader->GetErrorCode() != 0 || said.text().find("ERROR") != std::string::npos)
-    throw InputError(fmt::format("{}: cannot be read: {}", file.string(), said.text()));
+  if (errors.any()) throw InputError(fmt::format("{}: cannot be read: {}", file.string(), errors.text()));
   return data;
 }
 
@@ -235,8 +254,9 @@ void write_surface(const Surface& surface, const std::filesystem::path& file) {
   writer->SetFileName(file.c_str());
   writer->SetInputData(data);
   writer->SetHeaderTypeToUInt64();
-  const CollectedVtkText said;
-  if (writer->Write() == 0) throw InputError(fmt::format("{}: cannot be written: {}", file.string(), said.text()));
+  const VtkErrors errors(*writer);
+  if (writer->Write() == 0 || errors.any())
+    throw InputError(fmt::format("{}: cannot be written: {}", file.string(), errors.text()));
 }
 
 }  // namespace supine::reconstruction

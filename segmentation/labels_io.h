@@ -10,7 +10,7 @@
 namespace supine::segmentation {
 
 /// What the case says about its labels beyond the voxels, carried along as string field data: `cut` (comma list of
-/// excluded, edge, rim) and `rim_mm`.
+/// excluded, edge, rim), `rim_mm` and `side` (left, right or both).
 using LabelNotes = std::map<std::string, std::string>;
 
 /// Writes labels.vti: points at the voxel centres with the uint8 point array `tissue`; field data `frame` = "LPS",
@@ -23,7 +23,7 @@ void write_labels(const LabelImage& labels, const std::filesystem::path& file, c
 /// @throws InputError  as read_image; also when there is no point array `tissue` or a value is not a Tissue
 LabelImage read_labels(const std::filesystem::path& file);
 
-/// The notes `cut` and `rim_mm` of a .vti, as far as it has them. @throws InputError  as read_image
+/// The notes `cut`, `rim_mm` and `side` of a .vti, as far as it has them. @throws InputError  as read_image
 LabelNotes read_label_notes(const std::filesystem::path& file);
 
 }  // namespace supine::segmentation

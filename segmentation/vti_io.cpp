@@ -192,7 +192,7 @@ LabelNotes read_label_notes(const std::filesystem::path& file) {
   vtkNew<vtkXMLImageDataReader> reader;
   update(*reader, file);
   LabelNotes notes;
-  for (const char* key : {"cut", "rim_mm"})
+  for (const char* key : {"cut", "rim_mm", "side"})
     if (const auto value = field_string(*reader->GetOutput(), key)) notes[key] = *value;
   return notes;
 }

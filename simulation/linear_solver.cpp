@@ -47,6 +47,7 @@ LuSolver::LuSolver(const SparseMatrix& pattern) : state_(std::make_unique<State>
   use_one_blas_thread();
   // The pattern is symmetric and the diagonal strong: order for that.
   state_->solver.umfpackControl()[UMFPACK_STRATEGY] = UMFPACK_STRATEGY_SYMMETRIC;
+  state_->solver.umfpackControl()[UMFPACK_ORDERING] = UMFPACK_ORDERING_METIS;
   state_->solver.analyzePattern(pattern);
 }
 

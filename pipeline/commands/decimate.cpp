@@ -81,7 +81,7 @@ class DecimateTool : public Tool {
     json["euler"] = report.euler;
     json["closed"] = report.closed();
     json["manifold"] = report.manifold();
-    json["self_intersections"] = 0;
+    json["self_intersections"] = reconstruction::self_intersections(result.surface).size();
   }
 
   std::string surface_;

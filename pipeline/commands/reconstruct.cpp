@@ -133,7 +133,7 @@ class ReconstructTool : public Tool {
     json["genus"] = report.genus();
     json["closed"] = report.closed();
     json["manifold"] = report.manifold();
-    json["self_intersections"] = 0;
+    json["self_intersections"] = organ.self_intersections;
     json["less_smooth_points"] = organ.less_smooth_points;
     json["voxel_mm"] = organ.voxel_mm;
     return json;

@@ -24,12 +24,13 @@ using segmentation::LabelImage;
 using segmentation::tissue_count;
 using segmentation::tissue_names;
 
-/// The cuts the case allows, as supine-reconstruct reads them from labels.vti.
-segmentation::LabelNotes cut_notes(const AllowedCuts& cut) {
+/// What the later tools need of the case: the cuts it allows and the side.
+segmentation::LabelNotes notes_of(const Case& measured) {
+  const AllowedCuts& cut = measured.cut;
   std::string list;
   for (const auto& [name, allowed] : {std::pair("excluded", cut.excluded), {"edge", cut.edge}, {"rim", cut.rim}})
     if (allowed) list += fmt::format("{}{}", list.empty() ? "" : ",", name);
-  return {{"cut", list}, {"rim_mm", fmt::format("{}", cut.rim_mm)}};
+  return {{"cut", list}, {"rim_mm", fmt::format("{}", cut.rim_mm)}, {"side", measured.side}};
 }
 
 /// What the tool found out about the labels.
@@ -94,7 +95,7 @@ class SegmentTool : public Tool {
     if (target.extension() != ".vti")
       throw InputError(fmt::format("-o {}: the label file ends in .vti", target.string()));
     run.progress("writing");
-    segmentation::write_labels(labels, run.output(target), cut_notes(measured.cut));
+    segmentation::write_labels(labels, run.output(target), notes_of(measured));
     fill(run.figures(target), measured, labels.grid, findings);
     say(run, labels.grid, findings, target);
     return Outcome::done;

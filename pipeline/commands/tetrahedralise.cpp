@@ -32,6 +32,7 @@ constexpr double good_cells_share = 0.25;  // how far --cells may be missed
 
 /// Everything a run finds out besides the mesh itself.
 struct Findings {
+  std::string side;
   QualityReport quality;
   std::optional<meshing::FractionReport> fractions;
   std::optional<meshing::Anatomy> anatomy;
@@ -63,8 +64,7 @@ class TetrahedraliseTool : public Tool {
     app.add_option("--cells", options_.cells, "about so many tetrahedra, 0 = as the surface's triangles suggest");
     app.add_option("--radius-edge", options_.radius_edge, "circumradius over shortest edge aimed at, 1.2 to 3");
     app.add_option("--min-dihedral", options_.min_dihedral_deg, "smallest dihedral angle aimed at, degrees, 0 to 18");
-    app.add_option("--side", side_, "which breast it is; lateral direction and ligament ring need it")
-        ->check(CLI::IsMember({"left", "right", "both"}));
+    app.add_option("--side", side_, "which breast it is, left, right or both; default: what the labels say, or left");
     app.add_flag("--check", check_, "print the report, write nothing; exit code 1 when the mesh is not good");
   }
 
@@ -90,6 +90,7 @@ class TetrahedraliseTool : public Tool {
     const reconstruction::Surface surface = reconstruction::read_surface(run.input(surface_));
     const reconstruction::Surface muscle = reconstruction::read_surface(run.input(muscle_));
     const segmentation::LabelImage labels = segmentation::read_labels(run.input(labels_));
+    findings.side = find_side();
     run.stage("tetrahedra");
     run.progress("filling the surface with tetrahedra");
     TetMesh mesh = meshing::tetrahedralise(surface, options_, surface_);
@@ -107,13 +108,26 @@ class TetrahedraliseTool : public Tool {
     return mesh;
   }
 
+  std::string find_side() const {
+    std::string side = side_, from = "--side";
+    if (side.empty()) {
+      const segmentation::LabelNotes notes = segmentation::read_label_notes(labels_);
+      side = notes.contains("side") ? notes.at("side") : "left";
+      from = labels_;
+    }
+    if (side != "left" && side != "right" && side != "both") {
+      throw InputError(fmt::format("{}: side is \"{}\"; left, right or both is expected", from, side));
+    }
+    return side;
+  }
+
   void mark_ring(Run& run, TetMesh& mesh, Findings& findings) const {
-    if (side_ == "both") {
-      run.warn("--side both: no ligament ring is marked; the anatomy is that of one breast");
+    if (findings.side == "both") {
+      run.warn("both sides in one mesh: no ligament ring is marked; the anatomy is that of one breast");
       return;
     }
     try {
-      findings.anatomy = meshing::compute_anatomy(mesh, side_);
+      findings.anatomy = meshing::compute_anatomy(mesh, findings.side);
       if (meshing::mark_ligament_ring(mesh, *findings.anatomy) == 0) {
         run.warn(fmt::format("no inner face lies within {} mm of the mound's foot; no ligament ring is marked",
                              meshing::ligament_half_width_mm));
@@ -128,7 +142,7 @@ class TetrahedraliseTool : public Tool {
     const fs::path target = output.empty() ? fs::path(surface_).parent_path() / "mesh.vtu" : output;
     if (target.extension() != ".vtu")
       throw InputError(fmt::format("-o {}: the mesh file ends in .vtu", target.string()));
-    meshing::write_mesh(mesh, run.output(target), side_);
+    meshing::write_mesh(mesh, run.output(target), findings.side);
     fill(run.figures(target), findings);
     run.say(target.string());
   }
@@ -225,7 +239,7 @@ class TetrahedraliseTool : public Tool {
                         a.foot_radius_mm, a.rim_thickness_mm, a.mound_height_mm));
   }
 
-  std::string surface_, muscle_, labels_, side_ = "left";
+  std::string surface_, muscle_, labels_, side_;
   meshing::TetrahedraliseOptions options_;
   int order_ = 1;
   bool check_ = false;

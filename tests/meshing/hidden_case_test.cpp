@@ -72,8 +72,8 @@ TEST_P(HiddenCase, FootAndRimAreThoseOfTheBodyImaged) {
 INSTANTIATE_TEST_SUITE_P(Open, HiddenCase,
                          ::testing::Values("adhesion-1", "gland_stiffness-1", "gravity_tilt-1", "ligament-1",
                                            "misregistration-1", "null-1", "null-2", "strain_stiffening-1"),
-                         [](const auto& info) {
-                           std::string name = info.param;
+                         [](const auto& parameter) {
+                           std::string name = parameter.param;
                            std::replace(name.begin(), name.end(), '-', '_');
                            return name;
                          });

@@ -142,8 +142,12 @@ TEST(MuscleDistance, SlopeAndCurvatureAreThoseOfTheValue) {
       const auto there = distance.at(at + h * direction);
       const double value = std::abs(there.value_mm - here.value_mm - h * here.gradient.dot(direction));
       const double slope = (there.gradient - here.gradient - h * here.hessian * direction).norm();
-      if (halving > 0 && previous_value > 1e-9) EXPECT_GT(std::log2(previous_value / value), 1.9) << at.transpose();
-      if (halving > 0 && previous_slope > 1e-9) EXPECT_GT(std::log2(previous_slope / slope), 1.9) << at.transpose();
+      if (halving > 0 && previous_value > 1e-9) {
+        EXPECT_GT(std::log2(previous_value / value), 1.9) << at.transpose();
+      }
+      if (halving > 0 && previous_slope > 1e-9) {
+        EXPECT_GT(std::log2(previous_slope / slope), 1.9) << at.transpose();
+      }
       previous_value = value;
       previous_slope = slope;
     }

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "reconstruction/surface_io.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+
+#include "reconstruction/surface_check.h"
+#include "tests/reconstruction/volumes.h"
+
+namespace supine::reconstruction {
+namespace {
+
+using testing::ball;
+using testing::message_of;
+
+class SurfaceFiles : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::temp_directory_path() / fmt::format("supine_surface_{}_{}", test->name(), ::getpid());
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return folder_ / name;
+  }
+  std::string refusal(const std::string& name, const std::string& text) const {
+    const auto file = write(name, text);
+    return message_of([&file] { read_surface(file); });
+  }
+
+  std::filesystem::path folder_;
+};
+
+constexpr const char* tetrahedron_faces = "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+std::string ply(const std::string& comment, const std::string& faces = tetrahedron_faces, int face_count = 4) {
+  return fmt::format(
+      "ply\nformat ascii 1.0\n{}element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face "
+      "{}\n"
+      "property list uchar int vertex_indices\nend_header\n0 0 0\n10 0 0\n0 20 0\n0 0 30\n{}",
+      comment, face_count, faces);
+}
+
+TEST_F(SurfaceFiles, OurOwnFormatGivesBackEveryBitOfPointsTrianglesAndRegions) {
+  Surface in = ball(33.3, 2);
+  in.region = Eigen::VectorXi::LinSpaced(in.triangles.rows(), 1, 4);
+  write_surface(in, folder_ / "a.vtp");
+  const SurfaceFile out = read_surface_file(folder_ / "a.vtp");
+  EXPECT_EQ(out.frame, "LPS");
+  EXPECT_EQ(out.surface.points, in.points);
+  EXPECT_EQ(out.surface.triangles, in.triangles);
+  EXPECT_EQ(out.surface.region, in.region);
+}
+
+TEST_F(SurfaceFiles, SameSurfaceSameBytes) {
+  const auto bytes = [](const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  write_surface(ball(10, 1), folder_ / "a.vtp");
+  write_surface(ball(10, 1), folder_ / "b.vtp");
+  EXPECT_EQ(bytes(folder_ / "a.vtp"), bytes(folder_ / "b.vtp"));
+}
+
+TEST_F(SurfaceFiles, BarePointsStayPoints) {
+  Surface points;
+  points.points = ball(10, 0).points;
+  write_surface(points, folder_ / "points.vtp");
+  EXPECT_EQ(read_surface(folder_ / "points.vtp").points, points.points);
+  const auto file =
+      write("p.ply",
+            "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n"
+            "end_header\n1 2 3\n4 5 6\n");
+  const Surface read = read_surface(file);
+  EXPECT_EQ(read.points.rows(), 2);
+  EXPECT_EQ(read.triangles.rows(), 0);
+  EXPECT_EQ(read.points.row(1), Eigen::RowVector3d(4, 5, 6));
+  EXPECT_EQ(read_surface(write("p.obj", "v 1 2 3\nv 4 5 6\nv 7 8 9\n")).points.rows(), 3);
+}
+
+TEST_F(SurfaceFiles, PlyTextAndItsFrame) {
+  const SurfaceFile bare = read_surface_file(write("a.ply", ply("")));
+  EXPECT_FALSE(bare.frame);
+  EXPECT_DOUBLE_EQ(check_surface(bare.surface).volume_mm3, 1000);
+  EXPECT_EQ(read_surface_file(write("b.ply", ply("comment frame LPS, unit mm\n"))).frame, "LPS");
+  const Surface turned = read_surface(write("c.ply", ply("comment frame RAS\n")), "LPS");
+  EXPECT_EQ(turned.points.row(1), Eigen::RowVector3d(-10, 0, 0));
+  EXPECT_EQ(turned.points.row(2), Eigen::RowVector3d(0, -20, 0));
+  EXPECT_DOUBLE_EQ(check_surface(turned).volume_mm3, 1000) << "a turn keeps the orientation";
+  EXPECT_EQ(read_surface(folder_ / "a.ply", "RAS").points, turned.points) << "a bare file takes the frame of the case";
+  EXPECT_EQ(read_surface(folder_ / "b.ply", "RAS").points, bare.surface.points) << "the file's own word goes first";
+}
+
+TEST_F(SurfaceFiles, PolygonsBecomeTriangles) {
+  const Surface square = read_surface(write("quad.ply", ply("", "4 0 1 3 2\n", 1)));
+  EXPECT_EQ(square.triangles.rows(), 2);
+  const Surface obj = read_surface(write("quad.obj", "# frame: LPS\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"));
+  EXPECT_EQ(obj.triangles.rows(), 2);
+  EXPECT_NEAR(check_surface(obj).area_mm2, 1, 1e-6);
+}
+
+TEST_F(SurfaceFiles, StlPointsAreMerged) {
+  std::string text = "solid frame LPS\n";
+  const Surface in = ball(10, 0);
+  for (Eigen::Index t = 0; t < in.triangles.rows(); ++t) {
+    text += "facet normal 0 0 0\nouter loop\n";
+    for (int c = 0; c < 3; ++c) {
+      const auto p = in.points.row(in.triangles(t, c));
+      text += fmt::format("vertex {} {} {}\n", p.x(), p.y(), p.z());
+    }
+    text += "endloop\nendfacet\n";
+  }
+  const SurfaceFile read = read_surface_file(write("a.stl", text + "endsolid\n"));
+  EXPECT_EQ(read.frame, "LPS");
+  EXPECT_EQ(read.surface.points.rows(), 12);
+  EXPECT_TRUE(check_surface(read.surface).closed());
+  EXPECT_NE(refusal("cut.stl", text).find("cut short"), std::string::npos);
+}
+
+TEST_F(SurfaceFiles, BinaryStl) {
+  std::string bytes(80, ' ');
+  const std::uint32_t count = 1;
+  bytes.append(reinterpret_cast<const char*>(&count), 4);
+  const float numbers[12] = {0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0};
+  bytes.append(reinterpret_cast<const char*>(numbers), sizeof numbers);
+  bytes.append(2, '\0');
+  EXPECT_EQ(read_surface(write("b.stl", bytes)).triangles.rows(), 1);
+  bytes.pop_back();
+  EXPECT_NE(refusal("c.stl", bytes).find("cut short"), std::string::npos);
+}
+
+TEST_F(SurfaceFiles, EachRefusalNamesTheFileAndTheFault) {
+  const auto expect = [](const std::string& message, std::initializer_list<const char*> words) {
+    for (const char* word : words) EXPECT_NE(message.find(word), std::string::npos) << word << " in: " << message;
+  };
+  expect(message_of([this] { read_surface(folder_ / "none.ply"); }), {"none.ply", "no such file"});
+  expect(refusal("a.txt", "x"), {"a.txt", ".ply", ".vtp"});
+  expect(refusal("a.ply", "solid"), {"a.ply", "not a PLY"});
+  expect(refusal("short.ply", ply("").substr(0, ply("").size() - 10)), {"short.ply", "cut short"});
+  expect(refusal("head.ply", "ply\nformat ascii 1.0\n"), {"end_header"});
+  expect(refusal("index.ply", ply("", "3 0 1 9\n", 1)), {"index.ply", "9", "4"});
+  expect(refusal("both.ply", ply("comment frame LPS\ncomment frame RAS\n")), {"both.ply", "LPS", "RAS"});
+  expect(refusal("frame.ply", ply("comment frame XYZ\n")), {"XYZ"});
+  expect(refusal("unit.ply", ply("comment unit m\n")), {"\"m\"", "mm"});
+  expect(refusal("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"), {"index.obj", "line 4", "4", "3"});
+  expect(refusal("empty.obj", "# nothing\n"), {"empty.obj", "no vertices"});
+  expect(refusal("a.stl", "hello"), {"a.stl", "not an STL"});
+  expect(refusal("a.vtp", "<VTKFile"), {"a.vtp", "cannot be read"});
+  expect(message_of([this] { read_surface(write("ok.ply", ply("")), "XYZ"); }), {"XYZ", "LPS", "RAS"});
+}
+
+TEST_F(SurfaceFiles, NotANumberIsRefusedWithItsPoint) {
+  Surface bad = ball(10, 0);
+  bad.points(7, 1) = std::nan("");
+  write_surface(bad, folder_ / "nan.vtp");
+  const std::string message = message_of([this] { read_surface(folder_ / "nan.vtp"); });
+  EXPECT_NE(message.find("point 7"), std::string::npos) << message;
+}
+
+TEST_F(SurfaceFiles, RegionOutOfRangeIsRefused) {
+  Surface bad = ball(10, 0);
+  bad.region = Eigen::VectorXi::Constant(bad.triangles.rows(), 9);
+  write_surface(bad, folder_ / "region.vtp");
+  const std::string message = message_of([this] { read_surface(folder_ / "region.vtp"); });
+  EXPECT_NE(message.find("region 9"), std::string::npos) << message;
+}
+
+TEST_F(SurfaceFiles, UnwritablePathIsRefused) {
+  EXPECT_NE(message_of([] { write_surface(ball(1, 0), "/no/such/folder/a.vtp"); }).find("cannot be written"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace supine::reconstruction
