@@ -46,6 +46,15 @@ TEST(LabelsIo, SameLabelsSameBytes) {
   EXPECT_NE(bytes_of(folder / "a.vti").find("tissue_names"), std::string::npos);
 }
 
+TEST(LabelsIo, NotesTravelWithTheLabels) {
+  const TemporaryFolder folder;
+  const LabelNotes notes = {{"cut", "edge,rim"}, {"rim_mm", "12.5"}};
+  write_labels(some_labels(), folder / "noted.vti", notes);
+  write_labels(some_labels(), folder / "bare.vti");
+  EXPECT_EQ(read_label_notes(folder / "noted.vti"), notes);
+  EXPECT_TRUE(read_label_notes(folder / "bare.vti").empty());
+}
+
 TEST(LabelsIo, RefusesValuesThatAreNoTissue) {
   const TemporaryFolder folder;
   write_vti(folder / "grey.vti", numbered_image());
