@@ -40,6 +40,7 @@ SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, P
   mechanics_.evaluate(State{known, known, 1.0}, Demand{.residual = true}, sums_);
   weight_norm_ = sums_.residual.norm();
   SolveReport report;
+  factorisations_ = 0;
   double load = 0, step = 1;
   Points at_load = sought, trial;
   Attempt last;
@@ -73,30 +74,42 @@ SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, P
         what, 100 * load, last.reason, place));
   }
   sought = at_load;
+  report.factorisations = factorisations_;
   return report;
+}
+
+State EquilibriumSolver::state_of(Unknown unknown, const Points& known, const Points& sought, double load) {
+  return unknown == Unknown::deformed ? State{sought, known, load} : State{known, sought, load};
 }
 
 void EquilibriumSolver::evaluate(Unknown unknown, const Points& known, const Points& sought, double load) {
   const bool forward = unknown == Unknown::deformed;
   const Demand demand{.energy = forward, .residual = true, .tangent = forward, .reference_tangent = !forward};
-  mechanics_.evaluate(forward ? State{sought, known, load} : State{known, sought, load}, demand, sums_);
+  mechanics_.evaluate(state_of(unknown, known, sought, load), demand, sums_);
 }
 
-bool EquilibriumSolver::direction(Unknown unknown, Eigen::VectorXd& step) {
-  if (unknown == Unknown::undeformed || !mechanics_.has_energy()) {
-    if (!lu_->factorise(unknown == Unknown::undeformed ? sums_.reference_tangent : sums_.tangent)) return false;
-    step = -lu_->solve(sums_.residual);
-    return step.allFinite();
-  }
-  // Where the energy is not convex the smallest shift that makes it so gives a descent direction.
+bool EquilibriumSolver::direction(Unknown unknown, const State& state, Eigen::VectorXd& step) {
+  if (unknown == Unknown::deformed && mechanics_.has_energy()) return descent_direction(state, step);
+  ++factorisations_;
+  if (!lu_->factorise(unknown == Unknown::undeformed ? sums_.reference_tangent : sums_.tangent)) return false;
+  step = -lu_->solve(sums_.residual);
+  return step.allFinite();
+}
+
+bool EquilibriumSolver::descent_direction(const State& state, Eigen::VectorXd& step) {
+  // The exact tangent where it is positive definite; where it is not, the one without the skin's negative curvature;
+  // and if the tissue's is negative too, with the smallest shift that makes it so.
   double shift = 0;
-  const double scale = sums_.tangent.diagonal().cwiseAbs().mean();
-  for (int attempt = 0; attempt < 9; ++attempt) {
+  for (int attempt = 0; attempt < 10; ++attempt) {
+    ++factorisations_;
     if (cholesky_->factorise(sums_.tangent, shift)) {
       step = -cholesky_->solve(sums_.residual);
       return step.allFinite();
     }
-    shift = shift == 0 ? 1e-4 * scale : 6 * shift;
+    if (attempt == 0)
+      mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true, .convex = true}, sums_);
+    else
+      shift = attempt == 1 ? 1e-4 * sums_.tangent.diagonal().cwiseAbs().mean() : 6 * shift;
   }
   return false;
 }
@@ -122,7 +135,8 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
                                           iteration, attempt.residual_share),
              attempt;
     ++attempt.iterations;
-    if (!direction(unknown, step)) return attempt.reason = "the tangent matrix is singular", attempt;
+    if (!direction(unknown, state_of(unknown, known, sought, load), step))
+      return attempt.reason = "the tangent matrix is singular", attempt;
     const double longest = step.cwiseAbs().maxCoeff();
     if (longest > longest_step_mm) step *= longest_step_mm / longest;
     const double slope = sums_.residual.dot(step);

@@ -19,7 +19,8 @@ struct SolveOptions {
 };
 
 struct SolveReport {
-  int newton_iterations = 0;  ///< factorisations, over all load steps
+  int newton_iterations = 0;  ///< over all load steps
+  int factorisations = 0;     ///< more than iterations where the energy is not convex
   int load_steps = 0;         ///< completed
   double min_det_f = 1;
   double residual_share = 0;  ///< |r| / |weight| at the end
@@ -53,8 +54,10 @@ class EquilibriumSolver {
   };
   SolveReport step_load(Unknown unknown, const Points& known, Points& sought, const std::string& what);
   Attempt newton(Unknown unknown, const Points& known, Points& sought, double load);
+  static State state_of(Unknown unknown, const Points& known, const Points& sought, double load);
   void evaluate(Unknown unknown, const Points& known, const Points& sought, double load);
-  bool direction(Unknown unknown, Eigen::VectorXd& step);
+  bool direction(Unknown unknown, const State& state, Eigen::VectorXd& step);
+  bool descent_direction(const State& state, Eigen::VectorXd& step);
 
   const Mechanics& mechanics_;
   SolveOptions options_;
@@ -62,6 +65,7 @@ class EquilibriumSolver {
   std::unique_ptr<CholeskySolver> cholesky_;
   std::unique_ptr<LuSolver> lu_;
   double weight_norm_ = 0;
+  int factorisations_ = 0;
 };
 
 }  // namespace supine::simulation

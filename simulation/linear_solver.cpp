@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/linear_solver.h"
 
+#include <omp.h>
+
 #include <Eigen/CholmodSupport>
 #include <Eigen/UmfPackSupport>
 
@@ -14,6 +16,18 @@ namespace supine::simulation {
 namespace {
 
 void use_one_blas_thread() { openblas_set_num_threads(1); }
+
+/// CHOLMOD asks for four threads whatever OMP_NUM_THREADS says; on two cores they cost more than they give.
+class SingleThreaded {
+ public:
+  SingleThreaded() : levels_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
+  ~SingleThreaded() { omp_set_max_active_levels(levels_); }
+  SingleThreaded(const SingleThreaded&) = delete;
+  SingleThreaded& operator=(const SingleThreaded&) = delete;
+
+ private:
+  int levels_;
+};
 
 }  // namespace
 
@@ -30,12 +44,14 @@ CholeskySolver::CholeskySolver(const SparseMatrix& pattern) : state_(std::make_u
 CholeskySolver::~CholeskySolver() = default;
 
 bool CholeskySolver::factorise(const SparseMatrix& matrix, double shift) {
+  const SingleThreaded guard;
   state_->solver.setShift(shift);
   state_->solver.factorize(matrix);
   return state_->solver.info() == Eigen::Success;
 }
 
 Eigen::VectorXd CholeskySolver::solve(const Eigen::VectorXd& right_hand_side) const {
+  const SingleThreaded guard;
   return state_->solver.solve(right_hand_side);
 }
 

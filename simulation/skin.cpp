@@ -3,6 +3,8 @@
 
 #include <ceres/jet.h>
 
+#include <Eigen/Eigenvalues>
+
 namespace supine::simulation {
 namespace {
 
@@ -63,6 +65,13 @@ Eigen::Matrix3d metric_derivative(const Eigen::Matrix<double, N, 2>& gradient, i
   return d;
 }
 
+/// The nearest positive semi-definite matrix.
+template <int N>
+Eigen::Matrix<double, N, N> convex_part(const Eigen::Matrix<double, N, N>& m) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> eigen(0.5 * (m + m.transpose()));
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
+}
+
 }  // namespace
 
 template <class Face>
@@ -109,13 +118,18 @@ void SkinTerm<Face>::add_face(int e, const State& state, const Demand& demand, L
     const auto force = membrane_force<n>(gradient, stress, now, weight);
     Eigen::Matrix2d stress_matrix;
     stress_matrix << stress[0], stress[1], stress[1], stress[2];
+    const Eigen::Vector3d twice(1, 2, 1);
+    Eigen::Matrix3d material =
+        0.5 * twice.asDiagonal() * by_g;  // ½: T^{αβ} = 2 ∂e/∂g_αβ, the off-diagonal stands for two
+    if (demand.convex) {
+      stress_matrix = convex_part<2>(stress_matrix);
+      material = convex_part<3>(material);
+    }
     const Eigen::Matrix<double, n, n> geometric = weight * gradient * stress_matrix * gradient.transpose();
     for (int a = 0; a < n; ++a) {
       local.residual.template segment<3>(3 * a) += force.row(a).transpose();
-      // ½ because T^{αβ} = 2 ∂e/∂g_αβ with the off-diagonal entry standing for two.
-      const Eigen::Matrix3d left = 0.5 * weight * metric_derivative<n>(gradient, a, now).transpose();
-      const Eigen::Vector3d twice(1, 2, 1);
-      const Eigen::Matrix3d to_x = left * twice.asDiagonal() * by_g, to_rest = left * twice.asDiagonal() * by_rest;
+      const Eigen::Matrix3d left = weight * metric_derivative<n>(gradient, a, now).transpose();
+      const Eigen::Matrix3d to_x = left * material, to_rest = 0.5 * left * twice.asDiagonal() * by_rest;
       for (int b = 0; b < n; ++b) {
         auto block = local.tangent.template block<3, 3>(3 * a, 3 * b);
         block.noalias() += to_x * metric_derivative<n>(gradient, b, now);

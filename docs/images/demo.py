@@ -120,7 +120,7 @@ def panel(window, column, title, actors, lookup=None):
     camera.SetPosition(-140, -150, -420)
     camera.SetViewUp(0, -1, 0)
     camera.ParallelProjectionOn()
-    camera.SetParallelScale(80)
+    camera.SetParallelScale(92)
     view.ResetCameraClippingRange()
     window.AddRenderer(view)
 
@@ -140,7 +140,7 @@ def main(folder, picture):
     lookup = diverging(6)
     compared = surface(folder, "comparison")
     covered = actor(part(compared, 0, "covered", 1), (1, 1, 1), 1, lookup)
-    panel(window, 3, "against the measured scan (grey: no scan)", [muscle, actor(compared, (0.8, 0.8, 0.8)), covered], lookup)
+    panel(window, 3, "against the scan (grey: none)", [muscle, actor(compared, (0.8, 0.8, 0.8)), covered], lookup)
     window.Render()
     grab = vtkWindowToImageFilter()
     grab.SetInput(window)

@@ -171,6 +171,7 @@ class SimulateTool : public Tool {
     f["round_trip_max_mm"] = solution.round_trip_max_mm;
     f["round_trip_rms_mm"] = solution.round_trip_rms_mm;
     f["newton_iterations"] = report.newton_iterations;
+    f["factorisations"] = report.factorisations;
     f["load_steps"] = report.load_steps;
     f["min_det_f"] = report.min_det_f;
     f["residual_share"] = report.residual_share;
