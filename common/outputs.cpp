@@ -2,6 +2,7 @@
 #include "common/outputs.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -53,12 +54,19 @@ Outputs::~Outputs() {
     std::filesystem::remove(temporary, ignored);
     unregister_temporary(temporary.string());
   }
+  for (auto folder = made_folders_.rbegin(); folder != made_folders_.rend(); ++folder) {
+    std::error_code ignored;  // a folder that somebody has put something into stays
+    std::filesystem::remove(*folder, ignored);
+  }
 }
 
 std::filesystem::path Outputs::stage(const std::filesystem::path& target) {
   namespace fs = std::filesystem;
   const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
   std::error_code failed;
+  std::vector<fs::path> missing;
+  for (fs::path at = folder; !at.empty() && !fs::exists(at); at = at.parent_path()) missing.push_back(at);
+  made_folders_.insert(made_folders_.end(), missing.rbegin(), missing.rend());
   fs::create_directories(folder, failed);
   if (!fs::is_directory(folder))
     throw InputError("output folder " + folder.string() + " cannot be created" +
@@ -67,7 +75,7 @@ std::filesystem::path Outputs::stage(const std::filesystem::path& target) {
     throw InputError("output file " + target.string() + " exists; add --force to replace it or choose another with -o");
 
   const fs::path temporary =
-      folder / ("." + target.stem().string() + ".part" + std::to_string(getpid()) + target.extension().string());
+      folder / fmt::format(".{}.part{}{}", target.stem().string(), getpid(), target.extension().string());
   const int descriptor = open(temporary.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0644);
   if (descriptor < 0)
     throw InputError("output folder " + folder.string() + " is not writable: " + std::strerror(errno) +
@@ -84,6 +92,7 @@ void Outputs::commit() {
     unregister_temporary(temporary.string());
   }
   staged_.clear();
+  made_folders_.clear();
 }
 
 void install_interrupt_handler() {

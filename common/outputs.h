@@ -10,8 +10,8 @@ namespace supine {
 /// A set of files that appear together or not at all.
 ///
 /// Each file is written under a temporary name in its own folder and renamed by commit().
-/// Leaving without commit() removes the temporary files, and so does Ctrl-C once
-/// install_interrupt_handler() has been called: no half-written file is ever seen.
+/// Leaving without commit() removes the temporary files and the folders made for them, and so does Ctrl-C once
+/// install_interrupt_handler() has been called (there the folders stay): no half-written file is ever seen.
 class Outputs {
  public:
   /// @param force  whether existing files may be replaced
@@ -31,6 +31,7 @@ class Outputs {
  private:
   bool force_;
   std::vector<std::pair<std::filesystem::path, std::filesystem::path>> staged_;  // temporary, target
+  std::vector<std::filesystem::path> made_folders_;                              // outermost first
 };
 
 /// Makes SIGINT and SIGTERM remove the staged files and end the process with code 130.

@@ -36,6 +36,16 @@ std::string describe(const std::map<int, Tissue>& table) {
       name, value, count, place(values.grid, first), describe(table)));
 }
 
+/// A tissue that is listed and has no voxel at all is more likely a wrong value than a wish.
+void refuse_empty_tissue(const LabelImage& labels, const std::map<int, Tissue>& table, const std::string& name) {
+  const TissueCounts counts = count_tissues(labels);
+  for (const auto& [value, tissue] : table)
+    if (tissue != Tissue::air && tissue != Tissue::excluded && counts[static_cast<int>(tissue)] == 0)
+      throw InputError(fmt::format(
+          "{}: empty label: {} = [{}] in [image.labels], but no voxel has it; correct the value, or take the line out",
+          name, tissue_names[static_cast<int>(tissue)], value));
+}
+
 bool is_tissue(std::uint8_t value) { return is_meshed(static_cast<Tissue>(value)); }
 
 }  // namespace
@@ -64,6 +74,7 @@ MappedLabels map_labels(const GreyImage& values, const std::map<int, Tissue>& ta
     seen[at] = 1;
     mapped.image.voxels[n] = lookup[at];
   }
+  refuse_empty_tissue(mapped.image, table, name);
   for (const auto& [value, tissue] : table)
     if (!seen[static_cast<std::size_t>(value - lowest)])
       mapped.warnings.push_back(

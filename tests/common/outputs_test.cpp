@@ -38,7 +38,10 @@ TEST_F(OutputsTest, FilesAppearTogetherOnCommit) {
 }
 
 TEST_F(OutputsTest, WithoutCommitNothingIsLeft) {
-  { std::ofstream(Outputs(false).stage(folder / "a.txt")) << "A"; }
+  {
+    Outputs outputs(false);
+    std::ofstream(outputs.stage(folder / "new" / "deep" / "a.txt")) << "A";
+  }
   EXPECT_EQ(files(), 0u);
 }
 

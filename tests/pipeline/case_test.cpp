@@ -193,7 +193,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "poses = [\"supine\"]",
                 "poses = [\"tilt45\"]",
                 {"[pose.tilt45]", "no surface"}}),
-    [](const auto& info) { return info.param.name; });
+    [](const auto& place) { return place.param.name; });
 
 TEST_F(CaseFile, AFolderThatIsNotThereIsNamed) {
   expect_words(input_error([] { read_case("/no/such/case"); }), {"/no/such/case", "not there"});

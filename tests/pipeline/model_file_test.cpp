@@ -188,7 +188,7 @@ INSTANTIATE_TEST_SUITE_P(
             "UnknownEffectKey", "width_mm = 13", "witdh_mm = 13", {"[[effect]] witdh_mm", "did you mean width_mm?"}},
         BadModel{"EffectOutOfRange", "width_mm = 13", "width_mm = -3", {"width_mm = -3", "mm"}},
         BadModel{"UnknownOption", "arc = \"full\"", "arc = \"fulll\"", {"arc = \"fulll\"", "did you mean full?"}}),
-    [](const auto& info) { return info.param.name; });
+    [](const auto& place) { return place.param.name; });
 
 TEST_F(ModelFile, AFileThatIsNotThereIsNamed) {
   expect_words(input_error([] { read_model("/no/such/model.toml"); }), {"/no/such/model.toml"});

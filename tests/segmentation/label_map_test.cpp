@@ -49,11 +49,22 @@ TEST(LabelMap, MapsEveryValueByTheTable) {
 
 TEST(LabelMap, ListedValueThatDoesNotOccurIsAWarning) {
   GreyImage image = cube<float>(3, 1);
-  image.at(0, 0, 0) = 0;
+  image.at(0, 0, 0) = 29;
   image.at(0, 0, 1) = 40;
-  const auto warnings = map_labels(image, table, "labels.nrrd").warnings;
-  ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_NE(warnings[0].find("29 (gland)"), std::string::npos);
+  auto more = table;
+  more[95] = Tissue::gland;
+  const auto warnings = map_labels(image, more, "labels.nrrd").warnings;
+  ASSERT_EQ(warnings.size(), 2u);
+  EXPECT_NE(warnings[0].find("0 (air)"), std::string::npos);
+  EXPECT_NE(warnings[1].find("95 (gland)"), std::string::npos);
+}
+
+TEST(LabelMap, RefusesAListedTissueWithoutAnyVoxel) {
+  GreyImage image = cube<float>(3, 1);
+  image.at(0, 0, 1) = 40;
+  const std::string message = message_of([&] { map_labels(image, table, "labels.nrrd"); });
+  for (const char* part : {"labels.nrrd", "empty label", "gland", "29"})
+    EXPECT_NE(message.find(part), std::string::npos) << message;
 }
 
 TEST(LabelMap, RefusesUnlistedValueWithCountAndPlace) {

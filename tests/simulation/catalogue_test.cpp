@@ -99,7 +99,7 @@ TEST_P(CatalogueTest, RowsAreConsistent) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Effects, CatalogueTest, ::testing::ValuesIn(catalogue()),
-                         [](const auto& info) { return info.param->name(); });
+                         [](const auto& place) { return place.param->name(); });
 
 TEST(Catalogue, NamesAreUniqueAndFound) {
   for (const Effect* effect : catalogue()) EXPECT_EQ(find_effect(effect->name()), effect);
