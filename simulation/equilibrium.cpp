@@ -10,7 +10,8 @@ namespace {
 
 constexpr double sufficient_decrease = 1e-4;  // Armijo constant
 constexpr int max_halvings = 12;
-constexpr double longest_step_mm = 40;  // a Newton step beyond this is shortened before the line search
+constexpr double longest_step_mm = 40;   // a Newton step beyond this is shortened before the line search
+constexpr double loose_residual = 1e-7;  // a short step ends the search only this close to balance
 
 using Flat = Eigen::Map<Eigen::VectorXd>;
 
@@ -114,60 +115,61 @@ bool EquilibriumSolver::descent_direction(const State& state, Eigen::VectorXd& s
   return false;
 }
 
+void EquilibriumSolver::note_state(Attempt& attempt) const {
+  attempt.min_det_f = sums_.min_det_f;
+  attempt.min_cell = sums_.min_cell;
+  attempt.residual_share = weight_norm_ > 0 ? sums_.residual.norm() / weight_norm_ : 0;
+}
+
+bool EquilibriumSolver::search_line(Unknown unknown, const Points& known, Points& sought, double load,
+                                    const Eigen::VectorXd& step) {
+  const bool use_energy = unknown == Unknown::deformed && mechanics_.has_energy();
+  const double norm = sums_.residual.norm(), energy = sums_.energy, slope = sums_.residual.dot(step);
+  const bool last_digits = step.cwiseAbs().maxCoeff() < options_.step_tolerance_mm;
+  const Points start = sought;
+  double alpha = 1;
+  for (int halving = 0; halving <= max_halvings; ++halving, alpha *= 0.5) {
+    Flat(sought.data(), sought.size()) = Eigen::Map<const Eigen::VectorXd>(start.data(), start.size()) + alpha * step;
+    evaluate(unknown, known, sought, load);
+    if (!sums_.valid) continue;
+    if (last_digits) return true;  // the step moves by rounding only: neither merit says anything
+    const double rounding = 1e-13 * (std::abs(energy) + std::abs(sums_.energy));
+    if (use_energy ? sums_.energy <= energy + sufficient_decrease * alpha * slope + rounding
+                   : sums_.residual.norm() <= (1 - sufficient_decrease * alpha) * norm)
+      return true;
+  }
+  sought = start;
+  return false;
+}
+
 EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Points& known, Points& sought,
                                                      double load) {
-  const bool use_energy = unknown == Unknown::deformed && mechanics_.has_energy();
-  const double tolerance = options_.residual_tolerance * weight_norm_;
   Attempt attempt;
+  const auto give_up = [&attempt](std::string reason) {
+    attempt.reason = std::move(reason);
+    return attempt;
+  };
   Eigen::VectorXd step;
-  Points start;
   evaluate(unknown, known, sought, load);
   for (int iteration = 0;; ++iteration) {
-    const double norm = sums_.residual.norm(), energy = sums_.energy;
-    attempt.min_det_f = sums_.min_det_f;
-    attempt.min_cell = sums_.min_cell;
-    attempt.residual_share = weight_norm_ > 0 ? norm / weight_norm_ : 0;
-    if (!sums_.valid) return attempt.reason = "an element is inverted", attempt;
+    note_state(attempt);
+    if (!sums_.valid) return give_up("an element is inverted");
     if (options_.progress) options_.progress(load, iteration, attempt.residual_share);
-    if (norm <= tolerance) return attempt.converged = true, attempt;
+    const double moved = iteration == 0 ? longest_step_mm : step.cwiseAbs().maxCoeff();
+    attempt.converged = attempt.residual_share <= options_.residual_tolerance ||
+                        (moved < options_.step_tolerance_mm && attempt.residual_share <= loose_residual);
+    if (attempt.converged) return attempt;
     if (iteration == options_.max_iterations)
-      return attempt.reason = fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance",
-                                          iteration, attempt.residual_share),
-             attempt;
+      return give_up(fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iteration,
+                                 attempt.residual_share));
     ++attempt.iterations;
     if (!direction(unknown, state_of(unknown, known, sought, load), step))
-      return attempt.reason = "the tangent matrix is singular", attempt;
+      return give_up("the tangent matrix is singular");
     const double longest = step.cwiseAbs().maxCoeff();
     if (longest > longest_step_mm) step *= longest_step_mm / longest;
-    const double slope = sums_.residual.dot(step);
-
-    start = sought;
-    double alpha = 1;
-    bool accepted = false;
-    for (int halving = 0; halving <= max_halvings && !accepted; ++halving, alpha *= accepted ? 1 : 0.5) {
-      Flat(sought.data(), sought.size()) = Flat(start.data(), start.size()) + alpha * step;
-      evaluate(unknown, known, sought, load);
-      if (!sums_.valid) continue;
-      const double now = sums_.residual.norm();
-      const double rounding = 1e-13 * (std::abs(energy) + std::abs(sums_.energy));
-      accepted = use_energy ? sums_.energy <= energy + sufficient_decrease * alpha * slope + rounding
-                            : now <= (1 - sufficient_decrease * alpha) * norm;
-      // The last steps move by rounding only: there neither merit says anything.
-      if (alpha == 1 && longest < options_.step_tolerance_mm) accepted = true;
-    }
-    if (!accepted) {
-      sought = start;
-      return attempt.reason = fmt::format("the line search stalled with {:.1e} of the weight out of balance",
-                                          attempt.residual_share),
-             attempt;
-    }
-    if (longest < options_.step_tolerance_mm) {
-      attempt.converged = true;
-      attempt.min_det_f = sums_.min_det_f;
-      attempt.min_cell = sums_.min_cell;
-      attempt.residual_share = weight_norm_ > 0 ? sums_.residual.norm() / weight_norm_ : 0;
-      return attempt;
-    }
+    if (!search_line(unknown, known, sought, load, step))
+      return give_up(
+          fmt::format("the line search stalled with {:.1e} of the weight out of balance", attempt.residual_share));
   }
 }
 

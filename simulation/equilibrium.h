@@ -12,7 +12,7 @@ namespace supine::simulation {
 
 struct SolveOptions {
   int max_iterations = 40;            ///< Newton steps per load step
-  double step_tolerance_mm = 1e-8;    ///< the last full Newton step moved no node further
+  double step_tolerance_mm = 1e-8;    ///< the last Newton step moved no node further
   double residual_tolerance = 1e-11;  ///< or |r| is under this share of the weight
   double smallest_load_step = 1.0 / 128;
   std::function<void(double load, int iteration, double residual_share)> progress;  ///< may be empty
@@ -53,6 +53,8 @@ class EquilibriumSolver {
     double residual_share = 0;
   };
   SolveReport step_load(Unknown unknown, const Points& known, Points& sought, const std::string& what);
+  void note_state(Attempt& attempt) const;
+  bool search_line(Unknown unknown, const Points& known, Points& sought, double load, const Eigen::VectorXd& step);
   Attempt newton(Unknown unknown, const Points& known, Points& sought, double load);
   static State state_of(Unknown unknown, const Points& known, const Points& sought, double load);
   void evaluate(Unknown unknown, const Points& known, const Points& sought, double load);

@@ -72,6 +72,62 @@ Eigen::Matrix<double, N, N> convex_part(const Eigen::Matrix<double, N, N>& m) {
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
 }
 
+/// Stress of a membrane point and its derivatives with respect to both metrics.
+struct MembraneTangent {
+  double energy = 0;
+  Metric<double> stress;
+  Eigen::Matrix3d by_g, by_rest;  // ∂T/∂g and ∂T/∂G
+};
+
+MembraneTangent membrane_tangent(const SkinSettings& settings, const Metric<double>& g, const Metric<double>& rest,
+                                 double modulus, double prestretch) {
+  using Jet = ceres::Jet<double, 6>;
+  Metric<Jet> gj, rest_j;
+  for (int i = 0; i < 3; ++i) {
+    gj[i] = Jet(g[i], i);
+    rest_j[i] = Jet(rest[i], 3 + i);
+  }
+  const auto point = membrane_point<Jet>(settings, gj, rest_j, Jet(modulus), Jet(prestretch));
+  MembraneTangent result;
+  result.energy = point.energy.a;
+  for (int i = 0; i < 3; ++i) {
+    result.stress[i] = point.stress[i].a;
+    result.by_g.row(i) = point.stress[i].v.template head<3>().transpose();
+    result.by_rest.row(i) = point.stress[i].v.template tail<3>().transpose();
+  }
+  return result;
+}
+
+/// Adds the tangents of one quadrature point.
+/// @param now, before  deformed and undeformed tangent vectors of the parent coordinates
+template <int N>
+void add_membrane_tangent(const MembraneTangent& point, const Eigen::Matrix<double, N, 2>& gradient, double weight,
+                          const Eigen::Matrix<double, 3, 2>& now, const Eigen::Matrix<double, 3, 2>& before,
+                          const Demand& demand, Local<N>& local) {
+  Eigen::Matrix2d stress;
+  stress << point.stress[0], point.stress[1], point.stress[1], point.stress[2];
+  // ½ because T^{αβ} = 2 ∂e/∂g_αβ; the off-diagonal entry stands for two.
+  const Eigen::DiagonalMatrix<double, 3> half(0.5, 1, 0.5);
+  Eigen::Matrix3d material = half * point.by_g;
+  if (demand.convex) {
+    stress = convex_part<2>(stress);
+    material = convex_part<3>(material);
+  }
+  const Eigen::Matrix<double, N, N> geometric = weight * gradient * stress * gradient.transpose();
+  for (int a = 0; a < N; ++a) {
+    const Eigen::Matrix3d left = weight * metric_derivative<N>(gradient, a, now).transpose();
+    const Eigen::Matrix3d to_x = left * material, to_rest = left * (half * point.by_rest);
+    for (int b = 0; b < N; ++b) {
+      auto block = local.tangent.template block<3, 3>(3 * a, 3 * b);
+      block.noalias() += to_x * metric_derivative<N>(gradient, b, now);
+      block.diagonal().array() += geometric(a, b);
+      if (demand.reference_tangent)
+        local.reference_tangent.template block<3, 3>(3 * a, 3 * b).noalias() +=
+            to_rest * metric_derivative<N>(gradient, b, before);
+    }
+  }
+}
+
 }  // namespace
 
 template <class Face>
@@ -87,58 +143,23 @@ void SkinTerm<Face>::set_fields(const Fields<double>& fields) {
 template <class Face>
 void SkinTerm<Face>::add_face(int e, const State& state, const Demand& demand, Local<Face::nodes>& local) const {
   constexpr int n = Face::nodes;
-  using Jet = ceres::Jet<double, 6>;
   const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
   for (int p = 0; p < Face::points; ++p) {
     const auto& gradient = Face::table().gradient[p];
     const double weight = Face::table().weight[p];
     const Eigen::Matrix<double, 3, 2> now = x.transpose() * gradient, before = rest.transpose() * gradient;
-    const Metric<double> g = metric(now), rest_g = metric(before);
-    if (!demand.tangent && !demand.reference_tangent) {
-      const auto point = membrane_point<double>(settings_, g, rest_g, modulus_[e], prestretch_[e]);
-      local.energy += weight * point.energy;
-      const auto force = membrane_force<n>(gradient, point.stress, now, weight);
-      for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += force.row(a).transpose();
-      continue;
+    MembraneTangent point;
+    if (demand.tangent || demand.reference_tangent) {
+      point = membrane_tangent(settings_, metric(now), metric(before), modulus_[e], prestretch_[e]);
+      add_membrane_tangent<n>(point, gradient, weight, now, before, demand, local);
+    } else {
+      const auto plain = membrane_point<double>(settings_, metric(now), metric(before), modulus_[e], prestretch_[e]);
+      point.energy = plain.energy;
+      point.stress = plain.stress;
     }
-    Metric<Jet> gj, rest_j;
-    for (int i = 0; i < 3; ++i) {
-      gj[i] = Jet(g[i], i);
-      rest_j[i] = Jet(rest_g[i], 3 + i);
-    }
-    const auto point = membrane_point<Jet>(settings_, gj, rest_j, Jet(modulus_[e]), Jet(prestretch_[e]));
-    Metric<double> stress;
-    Eigen::Matrix3d by_g, by_rest;  // ∂T/∂g and ∂T/∂G
-    for (int i = 0; i < 3; ++i) {
-      stress[i] = point.stress[i].a;
-      by_g.row(i) = point.stress[i].v.template head<3>().transpose();
-      by_rest.row(i) = point.stress[i].v.template tail<3>().transpose();
-    }
-    local.energy += weight * point.energy.a;
-    const auto force = membrane_force<n>(gradient, stress, now, weight);
-    Eigen::Matrix2d stress_matrix;
-    stress_matrix << stress[0], stress[1], stress[1], stress[2];
-    const Eigen::Vector3d twice(1, 2, 1);
-    Eigen::Matrix3d material =
-        0.5 * twice.asDiagonal() * by_g;  // ½: T^{αβ} = 2 ∂e/∂g_αβ, the off-diagonal stands for two
-    if (demand.convex) {
-      stress_matrix = convex_part<2>(stress_matrix);
-      material = convex_part<3>(material);
-    }
-    const Eigen::Matrix<double, n, n> geometric = weight * gradient * stress_matrix * gradient.transpose();
-    for (int a = 0; a < n; ++a) {
-      local.residual.template segment<3>(3 * a) += force.row(a).transpose();
-      const Eigen::Matrix3d left = weight * metric_derivative<n>(gradient, a, now).transpose();
-      const Eigen::Matrix3d to_x = left * material, to_rest = 0.5 * left * twice.asDiagonal() * by_rest;
-      for (int b = 0; b < n; ++b) {
-        auto block = local.tangent.template block<3, 3>(3 * a, 3 * b);
-        block.noalias() += to_x * metric_derivative<n>(gradient, b, now);
-        block.diagonal().array() += geometric(a, b);
-        if (demand.reference_tangent)
-          local.reference_tangent.template block<3, 3>(3 * a, 3 * b).noalias() +=
-              to_rest * metric_derivative<n>(gradient, b, before);
-      }
-    }
+    local.energy += weight * point.energy;
+    const auto force = membrane_force<n>(gradient, point.stress, now, weight);
+    for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += force.row(a).transpose();
   }
 }
 

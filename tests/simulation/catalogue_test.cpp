@@ -116,8 +116,11 @@ TEST(Ligament, ActsOnTheFootAlone) {
   for (Eigen::Index p = 0; p < layout.interface.q.rows(); ++p) {
     const double distance = std::abs(scene.anatomy.from_foot_mm(layout.interface.q.row(p).transpose()));
     const double added = fields.interface_normal[p] - model.interface.normal_kpa_per_mm.value;
-    if (distance < 3.9) EXPECT_NEAR(added, 0.5, 1e-12);
-    if (distance > 8.1) EXPECT_EQ(added, 0);
+    if (distance < 3.9) {
+      EXPECT_NEAR(added, 0.5, 1e-12);
+    } else if (distance > 8.1) {
+      EXPECT_EQ(added, 0);
+    }
     inside += added > 0;
   }
   EXPECT_GT(inside, 10);
