@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <fstream>
 
 #include "common/error.h"
@@ -29,8 +30,8 @@ double coordinate(const std::string& field, const std::string& place) {
   double value = 0;
   const char* end = field.data() + field.size();
   const auto parsed = std::from_chars(field.data() + std::min(first, field.size()), end, value);
-  if (parsed.ec != std::errc() || parsed.ptr != end)
-    throw InputError(fmt::format("{}: '{}' is not a number; landmarks are name,x,y,z in mm", place, field));
+  if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(value))
+    throw InputError(fmt::format("{}: '{}' is not a finite number; landmarks are name,x,y,z in mm", place, field));
   return value;
 }
 

@@ -87,12 +87,19 @@ std::filesystem::path Outputs::stage(const std::filesystem::path& target) {
 }
 
 void Outputs::commit() {
+  // Held back meanwhile: an interrupt must not leave a new file beside an old sidecar.
+  sigset_t interrupts, before;
+  sigemptyset(&interrupts);
+  sigaddset(&interrupts, SIGINT);
+  sigaddset(&interrupts, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &interrupts, &before);
   for (const auto& [temporary, target] : staged_) {
     std::filesystem::rename(temporary, target);
     unregister_temporary(temporary.string());
   }
   staged_.clear();
   made_folders_.clear();
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 void install_interrupt_handler() {

@@ -1,8 +1,10 @@
 #!/bin/bash
 # SPDX-License-Identifier: AGPL-3.0-or-later
-# Prints the figures of one case from the sidecars in the folder OUT: summary.sh OUT
+# Prints the figures of one case from the sidecars in the folder OUT: summary.sh OUT [COMPARISON.vtp…]
+# Only the comparisons named are shown: others in the folder are left over from an earlier case file.
 set -euo pipefail
 out=${1:?which output folder?}
+shift
 
 # figure FILE JQ-EXPRESSION: the value, "-" when the file or the key is not there.
 figure() { if [ -f "$out/$1" ]; then jq -r "($2) // \"-\"" "$out/$1"; else echo "-"; fi; }
@@ -29,19 +31,24 @@ row "sag, undeformed to prone, most" mm %.2f "$(figure prone.json .displacement_
 row "sag, undeformed to supine, most" mm %.2f "$(figure supine.json .displacement_from_undeformed_mm.max)"
 row "way from prone to supine, most" mm %.2f "$(figure supine.json .displacement_from_prone_mm.max)"
 row "round trip to the imaged shape" mm %.1e "$(figure supine.json .round_trip_max_mm)"
-if [ -f "$out/comparison.json" ]; then
+if [[ " $* " == *"/comparison.vtp "* ]] && [ -f "$out/comparison.json" ]; then
   row "MAE (model to scan, study)" mm %.2f "$(figure comparison.json .mae_study_mm)"
   row "MAE (scan to model)" mm %.2f "$(figure comparison.json .mae_mm)"
   row "RMS" mm %.2f "$(figure comparison.json .rms_mm)"
   row "95th percentile" mm %.2f "$(figure comparison.json .p95_mm)"
   row "maximum" mm %.2f "$(figure comparison.json .hausdorff_mm)"
 fi
-for file in "$out"/comparison_*.json; do
-  if [ -f "$file" ]; then row "RMS, pose $(jq -r .pose "$file")" mm %.2f "$(jq -r .rms_mm "$file")"; fi
+for comparison in "$@"; do
+  file=${comparison%.vtp}.json
+  if [[ "$comparison" == */comparison_* ]] && [ -f "$file" ]; then row "RMS, pose $(jq -r .pose "$file")" mm %.2f "$(jq -r .rms_mm "$file")"; fi
 done
 echo
 echo "For ParaView, in $out:"
-for file in labels.vti breast.vtp muscle.vtp coarse.vtp mesh.vtu prone.vtu undeformed.vtu supine.vtu comparison.vtp scan.vtp \
+for file in labels.vti breast.vtp muscle.vtp coarse.vtp mesh.vtu prone.vtu undeformed.vtu supine.vtu \
   prone_tumour.vtp supine_tumour.vtp; do
   if [ -f "$out/$file" ]; then printf '  %s\n' "$file"; fi
+done
+for comparison in "$@"; do
+  name=${comparison##*/}
+  printf '  %s %s\n' "$name" "${name/comparison/scan}"
 done

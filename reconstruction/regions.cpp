@@ -42,6 +42,7 @@ class Refusal {
     place_ = image.grid.point(breast.inside.row(p).transpose().cast<double>());
     tissue_ = segmentation::tissue_names[static_cast<int>(tissue_at(image, breast.inside, p))];
   }
+  long count() const { return count_; }
   void throw_if_any() const {
     if (count_ == 0) return;
     throw InputError(
@@ -90,7 +91,10 @@ class NearMuscle {
 
 // Region of every point of the staircase surface.
 std::vector<Region> point_regions(const VoxelSurface& breast, const LabelImage& image, const CutRules& rules) {
-  Refusal at_edge("touches the edge of the image", "edge"), at_excluded("borders on excluded tissue", "excluded");
+  Refusal at_edge("touches the edge of the image", "edge"), at_excluded("borders on excluded tissue", "excluded"),
+      bare("borders on air without skin next to the muscle", "rim");
+  const bool has_skin = std::find(image.voxels.begin(), image.voxels.end(), static_cast<std::uint8_t>(Tissue::skin)) !=
+                        image.voxels.end();
   NearMuscle near_muscle(image);
   std::vector<Region> region(breast.inside.rows(), Region::skin);
   for (Eigen::Index p = 0; p < breast.inside.rows(); ++p) {
@@ -105,13 +109,19 @@ std::vector<Region> point_regions(const VoxelSurface& breast, const LabelImage& 
     } else if (beyond == Tissue::excluded) {
       region[p] = Region::cut;
       if (!rules.excluded) at_excluded.add(breast, image, p);
-    } else if (rules.rim && here != Tissue::skin && here != Tissue::nipple &&
+    } else if (here != Tissue::skin && here != Tissue::nipple && (rules.rim || has_skin) &&
                near_muscle.within(breast.surface.points.row(p).transpose(), rules.rim_mm)) {
-      region[p] = Region::cut;
+      if (rules.rim)
+        region[p] = Region::cut;
+      else
+        bare.add(breast, image, p);
     }
   }
   at_edge.throw_if_any();
   at_excluded.throw_if_any();
+  // Where skin is labelled, a broad bare face is a body cut off; a few bare voxels are gaps in the label.
+  constexpr double bare_share = 0.02;
+  if (static_cast<double>(bare.count()) > bare_share * static_cast<double>(breast.inside.rows())) bare.throw_if_any();
   return region;
 }
 

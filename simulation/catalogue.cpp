@@ -26,7 +26,7 @@ const std::vector<const Effect*>& catalogue() {
       Tissue::tumour, {"log_ratio", "1", 0, 0, 2.6, 1.5, 0.7, true, "ln of tumour stiffness over fat stiffness"});
   static const StiffnessGradient stiffness_gradient;
   static const GravityTilt gravity_tilt;
-  static const std::vector<const Effect*> all = {&ligament, &adhesion,           &strain_stiffening, &gland,
+  static const std::vector<const Effect*> all = {&adhesion, &ligament,           &strain_stiffening, &gland,
                                                  &tumour,   &stiffness_gradient, &gravity_tilt};
   return all;
 }

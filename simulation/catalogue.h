@@ -56,7 +56,8 @@ class Effect {
                      const std::map<std::string, std::string>& options, Fields<Dual>& fields) const = 0;
 };
 
-/// The catalogue, in the order tables list it.
+/// The catalogue, in the order in which effects act and tables list them: what multiplies a stiffness of the base model
+/// (adhesion) comes before what adds to it (ligament).
 const std::vector<const Effect*>& catalogue();
 
 /// @return nullptr for an unknown name

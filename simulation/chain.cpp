@@ -22,11 +22,29 @@ void check_prone_gravity(const PoseLoad& prone, const meshing::Anatomy& anatomy)
       prone.gravity.x(), prone.gravity.y(), prone.gravity.z(), n.x(), n.y(), n.z()));
 }
 
+/// Smallest det F of the final state, corners included. @throws NumericalFailure  naming the inverted cell
+double checked_min_det_f(const meshing::TetMesh& mesh, const Points& x, const Points& X, const std::string& what) {
+  Eigen::Index cell = 0;
+  const double least = cell_det_f(mesh.cells, x, X).minCoeff(&cell);
+  if (least > 0) return least;
+  Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
+  for (int a = 0; a < 4; ++a) centre += 0.25 * x.row(mesh.cells(cell, a));
+  throw NumericalFailure(
+      fmt::format("{}: cell {} at ({:.1f}, {:.1f}, {:.1f}) mm is turned inside out at a corner (det F = {:.3g}); make "
+                  "the mesh finer "
+                  "there or raise breast.young_modulus_kpa",
+                  what, cell, centre.x(), centre.y(), centre.z(), least));
+}
+
 /// Loads and solves on one mesh and one model; owns what is reused between poses.
 class Chain {
  public:
   Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model, const SolveOptions& options)
       : model_(model), mechanics_(mesh, anatomy, model), solver_(mechanics_, options) {}
+
+  void check_effects(const std::string& pose) const {
+    check_effects_act(model_, Scene{mechanics_.mesh(), mechanics_.anatomy(), mechanics_.layout(), pose});
+  }
 
   void load(const std::string& pose, const Eigen::Vector3d& gravity) {
     const Scene scene{mechanics_.mesh(), mechanics_.anatomy(), mechanics_.layout(), pose};
@@ -60,7 +78,9 @@ class Chain {
       Points x;
       const SolveReport forward = solver_.forward(X, x, "prone → undeformed (fixed point)");
       report.newton_iterations += forward.newton_iterations;
-      report.min_det_f = forward.min_det_f;
+      report.factorisations += forward.factorisations;
+      report.load_steps = forward.load_steps;
+      report.residual_share = forward.residual_share;
       error = (x - imaged).rowwise().norm().maxCoeff();
       if (error < correction_tolerance_mm) return report;
       X -= x - imaged;
@@ -83,13 +103,19 @@ ChainSolution solve_chain(const meshing::TetMesh& mesh, const meshing::Anatomy& 
   const PoseLoad& prone = poses.at(0);
   check_prone_gravity(prone, anatomy);
   Chain chain(mesh, anatomy, model, options);
+  chain.check_effects(poses.size() > 1 ? poses.back().name : prone.name);
   ChainSolution solution;
   solution.inverse = chain.undeformed(prone, method, solution.X);
+  solution.inverse.min_det_f = checked_min_det_f(mesh, mesh.points, solution.X, "undeformed");
   solution.round_trip = chain.pose(prone, solution.X);
   const Eigen::VectorXd error = (solution.round_trip.x - mesh.points).rowwise().norm();
   solution.round_trip_max_mm = error.maxCoeff();
   solution.round_trip_rms_mm = std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
-  for (std::size_t p = 1; p < poses.size(); ++p) solution.poses.push_back(chain.pose(poses[p], solution.X));
+  for (std::size_t p = 1; p < poses.size(); ++p) {
+    solution.poses.push_back(chain.pose(poses[p], solution.X));
+    PoseSolution& pose = solution.poses.back();
+    pose.report.min_det_f = checked_min_det_f(mesh, pose.x, solution.X, pose.name);
+  }
   return solution;
 }
 

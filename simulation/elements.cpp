@@ -102,6 +102,20 @@ const ShapeTable<6, 2, 6>& Tri6::table() {
   return t;
 }
 
+const std::array<Eigen::Matrix<double, 10, 3>, 4>& tet10_corner_gradients() {
+  static const auto gradients = [] {
+    std::array<Eigen::Matrix<double, 10, 3>, 4> all;
+    for (int corner = 0; corner < 4; ++corner) {
+      Eigen::Matrix<double, 10, 1> value;
+      Eigen::Matrix<double, 10, 4> derivative;
+      quadratic_simplex<3, 6>(Eigen::Vector4d::Unit(corner), tet_edges, value, derivative);
+      all[corner] = derivative * barycentric_gradient<3>();
+    }
+    return all;
+  }();
+  return gradients;
+}
+
 Eigen::Matrix<double, 10, 1> tet10_shape(const Eigen::Vector4d& b) {
   Eigen::Matrix<double, 10, 1> value;
   Eigen::Matrix<double, 10, 4> derivative;

@@ -40,6 +40,9 @@ struct Tri6 {
   static const ShapeTable<6, 2, 6>& table();
 };
 
+/// ∂N_a/∂ξ of the quadratic tetrahedron at its four corners, where it turns inside out first.
+const std::array<Eigen::Matrix<double, 10, 3>, 4>& tet10_corner_gradients();
+
 /// Shape functions of the quadratic tetrahedron at barycentric coordinates @p b (b.sum() = 1), VTK node order.
 Eigen::Matrix<double, 10, 1> tet10_shape(const Eigen::Vector4d& b);
 

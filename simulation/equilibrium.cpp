@@ -10,8 +10,8 @@ namespace {
 
 constexpr double sufficient_decrease = 1e-4;  // Armijo constant
 constexpr int max_halvings = 12;
-constexpr double longest_step_mm = 40;   // a Newton step beyond this is shortened before the line search
-constexpr double loose_residual = 1e-7;  // a short step ends the search only this close to balance
+constexpr double longest_step_mm = 40;  // a Newton step beyond this is shortened before the line search
+constexpr double largest_fall = 0.1;    // det F may fall to this share of its value in one step
 
 using Flat = Eigen::Map<Eigen::VectorXd>;
 
@@ -92,6 +92,7 @@ void EquilibriumSolver::evaluate(Unknown unknown, const Points& known, const Poi
 bool EquilibriumSolver::direction(Unknown unknown, const State& state, Eigen::VectorXd& step) {
   if (unknown == Unknown::deformed && mechanics_.has_energy()) return descent_direction(state, step);
   ++factorisations_;
+  exact_direction_ = true;
   if (!lu_->factorise(unknown == Unknown::undeformed ? sums_.reference_tangent : sums_.tangent)) return false;
   step = -lu_->solve(sums_.residual);
   return step.allFinite();
@@ -104,6 +105,7 @@ bool EquilibriumSolver::descent_direction(const State& state, Eigen::VectorXd& s
   for (int attempt = 0; attempt < 10; ++attempt) {
     ++factorisations_;
     if (cholesky_->factorise(sums_.tangent, shift)) {
+      exact_direction_ = attempt == 0;
       step = -cholesky_->solve(sums_.residual);
       return step.allFinite();
     }
@@ -125,13 +127,14 @@ bool EquilibriumSolver::search_line(Unknown unknown, const Points& known, Points
                                     const Eigen::VectorXd& step) {
   const bool use_energy = unknown == Unknown::deformed && mechanics_.has_energy();
   const double norm = sums_.residual.norm(), energy = sums_.energy, slope = sums_.residual.dot(step);
+  const double least_det_f = largest_fall * std::min(sums_.min_det_f, 1.0);
   const bool last_digits = step.cwiseAbs().maxCoeff() < options_.step_tolerance_mm;
   const Points start = sought;
   double alpha = 1;
   for (int halving = 0; halving <= max_halvings; ++halving, alpha *= 0.5) {
     Flat(sought.data(), sought.size()) = Eigen::Map<const Eigen::VectorXd>(start.data(), start.size()) + alpha * step;
     evaluate(unknown, known, sought, load);
-    if (!sums_.valid) continue;
+    if (!sums_.valid || sums_.min_det_f < least_det_f) continue;
     if (last_digits) return true;  // the step moves by rounding only: neither merit says anything
     const double rounding = 1e-13 * (std::abs(energy) + std::abs(sums_.energy));
     if (use_energy ? sums_.energy <= energy + sufficient_decrease * alpha * slope + rounding
@@ -157,7 +160,7 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
     if (options_.progress) options_.progress(load, iteration, attempt.residual_share);
     const double moved = iteration == 0 ? longest_step_mm : step.cwiseAbs().maxCoeff();
     attempt.converged = attempt.residual_share <= options_.residual_tolerance ||
-                        (moved < options_.step_tolerance_mm && attempt.residual_share <= loose_residual);
+                        (moved < options_.step_tolerance_mm && exact_direction_);
     if (attempt.converged) return attempt;
     if (iteration == options_.max_iterations)
       return give_up(fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iteration,

@@ -68,6 +68,7 @@ class EquilibriumSolver {
   std::unique_ptr<LuSolver> lu_;
   double weight_norm_ = 0;
   int factorisations_ = 0;
+  bool exact_direction_ = true;  // the last step came from the exact tangent: its length says how far the answer is
 };
 
 }  // namespace supine::simulation

@@ -91,6 +91,29 @@ Fields<Dual> base_fields(const Model& model, const Layout& layout, const Eigen::
   return fields;
 }
 
+void apply_effect(const Effect& effect, const EffectSetting& setting, const Scene& scene, Fields<Dual>& fields) {
+  std::vector<Dual> parameter_values;
+  for (const Parameter& row : effect.parameters()) {
+    const auto found = setting.parameters.find(row.name);
+    parameter_values.emplace_back(found != setting.parameters.end() ? found->second.value : row.median);
+  }
+  std::map<std::string, std::string> options;
+  for (const OptionRow& row : effect.options()) options[row.name] = row.default_value;
+  for (const auto& [name, value] : setting.options) options[name] = value;
+  effect.apply(scene, parameter_values, options, fields);
+}
+
+/// The same effect with every parameter that stands at its null moved to an ordinary size.
+EffectSetting with_typical_values(EffectSetting setting) {
+  const Effect* effect = find_effect(setting.name);
+  if (effect == nullptr) return setting;
+  for (const Parameter& row : effect->parameters()) {
+    auto& value = setting.parameters.try_emplace(row.name, Setting{row.median}).first->second.value;
+    if (value == row.null) value = row.null + 0.25 * (row.upper - row.null);
+  }
+  return setting;
+}
+
 Eigen::VectorXd values(const Fields<Dual>::Column& column) {
   Eigen::VectorXd out(column.size());
   for (Eigen::Index i = 0; i < column.size(); ++i) out[i] = column[i].a;
@@ -104,21 +127,42 @@ Layout make_layout(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy
 }
 
 Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity) {
+  for (const EffectSetting& setting : model.effects)
+    if (find_effect(setting.name) == nullptr)
+      throw InputError(fmt::format("effect '{}' is not in the catalogue", setting.name));
   Fields<Dual> fields = base_fields(model, scene.layout, gravity);
-  for (const EffectSetting& setting : model.effects) {
-    const Effect* effect = find_effect(setting.name);
-    if (effect == nullptr) throw InputError(fmt::format("effect '{}' is not in the catalogue", setting.name));
-    std::vector<Dual> parameter_values;
-    for (const Parameter& row : effect->parameters()) {
-      const auto found = setting.parameters.find(row.name);
-      parameter_values.emplace_back(found != setting.parameters.end() ? found->second.value : row.median);
-    }
-    std::map<std::string, std::string> options;
-    for (const OptionRow& row : effect->options()) options[row.name] = row.default_value;
-    for (const auto& [name, value] : setting.options) options[name] = value;
-    effect->apply(scene, parameter_values, options, fields);
-  }
+  for (const Effect* effect : catalogue())
+    for (const EffectSetting& setting : model.effects)
+      if (setting.name == effect->name()) apply_effect(*effect, setting, scene, fields);
   return fields;
+}
+
+void check_effects_act(const Model& model, const Scene& scene) {
+  for (const EffectSetting& setting : model.effects) {
+    Model alone = model;
+    alone.effects = {with_typical_values(setting)};
+    Model without = model;
+    without.effects.clear();
+    const Eigen::Vector3d gravity = Eigen::Vector3d(1, 2, 3).normalized();  // no rotation leaves it as it is
+    const auto with = values_of(make_fields(alone, scene, gravity));
+    const auto base = values_of(make_fields(without, scene, gravity));
+    const bool on_interface =
+        with.interface_normal != base.interface_normal || with.interface_tangential != base.interface_tangential;
+    const bool elsewhere = with.ln_young != base.ln_young || with.poisson != base.poisson ||
+                           with.skin_modulus != base.skin_modulus || with.skin_prestretch != base.skin_prestretch ||
+                           with.cut_stiffness != base.cut_stiffness || with.gravity != base.gravity;
+    const bool on_stiffening = with.stiffening != base.stiffening;
+    const auto refuse = [&setting](const char* reason) {
+      throw InputError(fmt::format("effect '{}' cannot change anything here: {}", setting.name, reason));
+    };
+    if (elsewhere) continue;
+    if (on_stiffening && model.breast.law != BulkLaw::neo_hookean)
+      refuse("it acts on breast.law = \"neo_hookean\" only; change the law or remove the effect");
+    if (on_interface && model.interface.kind != InterfaceKind::sliding)
+      refuse("interface.kind = \"fixed\" holds the whole inner surface; use \"sliding\" or remove the effect");
+    if (!on_interface && !on_stiffening)
+      refuse("the mesh has no tissue of its kind, or nothing lies where it acts (offset_mm, arc); remove the effect");
+  }
 }
 
 Fields<double> values_of(const Fields<Dual>& fields) {

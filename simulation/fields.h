@@ -54,9 +54,16 @@ struct Layout {
 
 Layout make_layout(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy);
 
-/// The fields of @p model in one pose: base model first, then its effects in their order.
+/// The fields of @p model in one pose: base model first, then its effects in the order of the catalogue, whatever
+/// their order in the model.
 /// @param gravity  unit vector of the pose
+/// @throws InputError  an effect that is not in the catalogue
 Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity);
+
+/// Refuses effects that can change nothing here, so that nobody waits for them: no tissue of that kind, no interface
+/// point in the ring, a law or a boundary that does not read the field.
+/// @throws InputError  naming the effect and the reason
+void check_effects_act(const Model& model, const Scene& scene);
 
 /// The numbers without their derivatives.
 Fields<double> values_of(const Fields<Dual>& fields);

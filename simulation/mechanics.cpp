@@ -51,6 +51,11 @@ Eigen::VectorXd det_f_of(const Indices& cells, const Points& x, const Points& X)
       const auto point = tet_point<Element>(rest, p);
       least = std::min(least, point.det > 0 ? (now.transpose() * point.b).determinant() : point.det);
     }
+    if constexpr (Element::nodes == 10)
+      for (const auto& gradient : tet10_corner_gradients()) {
+        const double before = (rest.transpose() * gradient).determinant();
+        least = std::min(least, before > 0 ? (now.transpose() * gradient).determinant() / before : before);
+      }
     smallest[c] = least;
   }
   return smallest;

@@ -46,7 +46,8 @@ class Mechanics {
   bool any_held_ = false;
 };
 
-/// Smallest det F (F = ∂x/∂X) over the quadrature points of each cell; <= 0 where X or x is inverted.
+/// Smallest det F (F = ∂x/∂X) over the quadrature points of each cell, and the corners of quadratic ones; <= 0 where X
+/// or x is inverted.
 Eigen::VectorXd cell_det_f(const Indices& cells, const Points& x, const Points& X);
 
 }  // namespace supine::simulation

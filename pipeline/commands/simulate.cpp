@@ -29,6 +29,9 @@ const std::map<std::string, InverseMethod> inverse_methods = {{"newton", Inverse
 // A round trip beyond this is not a certificate; the true inverse ends orders below.
 constexpr double round_trip_bound_mm = 1e-6;
 
+// Prone landmarks are marked on the imaged body: a little noise is to be expected, no more.
+constexpr double landmark_warning_mm = 2, landmark_bound_mm = 10;
+
 double rms(const Eigen::VectorXd& lengths) {
   return std::sqrt(lengths.squaredNorm() / static_cast<double>(lengths.size()));
 }
@@ -89,8 +92,14 @@ class SimulateTool : public Tool {
     run.stage("write");
     write(run, in, solution);
     say(run, in, solution);
-    if (inverse_ != "newton") return Outcome::done;
     if (solution.round_trip_max_mm <= round_trip_bound_mm) return Outcome::done;
+    if (inverse_ != "newton") {
+      run.warn(
+          fmt::format("the round trip ends {:.2e} mm from the imaged shape (bound {:.0e} mm): {} is not the inverse; "
+                      "use --inverse newton",
+                      solution.round_trip_max_mm, round_trip_bound_mm, inverse_));
+      return Outcome::target_not_met;
+    }
     run.warn(
         fmt::format("the round trip ends {:.2e} mm from the imaged shape (bound {:.0e} mm): loading the undeformed "
                     "shape again finds another equilibrium, so the prediction is one of several",
@@ -120,14 +129,35 @@ class SimulateTool : public Tool {
 
   std::vector<Passenger> passengers(Run& run, const Inputs& in) const {
     std::vector<Passenger> found;
-    for (const auto name : segmentation::tissue_names) {
-      const fs::path file = mesh_file_.parent_path() / (std::string(name) + ".vtp");
-      if (name == "muscle" || !fs::exists(file)) continue;
+    for (int tissue = 0; tissue < segmentation::tissue_count; ++tissue) {
+      const std::string name(segmentation::tissue_names[tissue]);
+      const fs::path file = mesh_file_.parent_path() / (name + ".vtp");
+      // A surface of a tissue the mesh does not have is left over from other labels.
+      if (in.mesh.fraction.col(tissue).sum() == 0 || !fs::exists(file)) continue;
       auto surface = reconstruction::read_surface(run.input(file));
       simulation::Embedding embedding(in.mesh, surface.points);
-      found.push_back({std::string(name), std::move(surface), std::move(embedding)});
+      found.push_back({name, std::move(surface), std::move(embedding)});
     }
     return found;
+  }
+
+  void check_landmarks(Run& run, const Inputs& in, const Landmarks& landmarks,
+                       const simulation::Embedding& places) const {
+    if (landmarks.names.empty()) return;
+    Eigen::Index worst = 0;
+    const double distance = places.outside_mm().maxCoeff(&worst);
+    if (distance <= landmark_warning_mm) return;
+    const std::string what = fmt::format("{}: landmark '{}' lies {:.1f} mm outside the imaged body",
+                                         in.measured.prone_landmarks->string(), landmarks.names[worst], distance);
+    if (distance <= landmark_bound_mm) return run.warn(what + "; it moves along with the closest tissue");
+    Points flipped = landmarks.points;
+    flipped.leftCols<2>() *= -1;
+    const double other = simulation::Embedding(in.mesh, flipped).outside_mm().maxCoeff();
+    throw InputError(fmt::format(
+        "{} (bound {} mm). {}", what, landmark_bound_mm,
+        other <= landmark_bound_mm ? "With x and y negated all lie inside: the file is RAS and case.frame says LPS, or "
+                                     "the other way round"
+                                   : "Check its unit (mm), its frame, and that it was marked in the prone image"));
   }
 
   void write(Run& run, const Inputs& in, const ChainSolution& solution) const {
@@ -137,6 +167,7 @@ class SimulateTool : public Tool {
     if (in.measured.prone_landmarks) {
       landmarks = read_landmarks(run.input(*in.measured.prone_landmarks), in.measured.frame);
       landmark_places.emplace(in.mesh, landmarks->points);
+      check_landmarks(run, in, *landmarks, *landmark_places);
     }
     const auto write_shape = [&](const std::string& name, const Points& x, const meshing::NamedTables& extra) {
       const fs::path file = folder() / (name + ".vtu");
@@ -177,7 +208,10 @@ class SimulateTool : public Tool {
     f["residual_share"] = report.residual_share;
     f["displacement_from_prone_mm"] = {{"rms", rms(from_prone)}, {"max", from_prone.maxCoeff()}};
     f["displacement_from_undeformed_mm"] = {{"rms", rms(from_undeformed)}, {"max", from_undeformed.maxCoeff()}};
-    f["nipple_mm"] = {x(in.anatomy.nipple_point, 0), x(in.anatomy.nipple_point, 1), x(in.anatomy.nipple_point, 2)};
+    if (const int nipple = in.anatomy.nipple_point; nipple >= 0)
+      f["nipple_mm"] = {x(nipple, 0), x(nipple, 1), x(nipple, 2)};
+    else
+      f["nipple_mm"] = nullptr;
     f["load_number"] = simulation::load_number(in.anatomy, in.model);
     f["nodes"] = in.mesh.points.rows();
     f["tetrahedra"] = in.mesh.cells.rows();

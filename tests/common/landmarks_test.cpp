@@ -49,6 +49,7 @@ TEST_F(LandmarksTest, BadFilesAreRefusedWithTheLine) {
   expect_refused("x,y,z\n1,2,3\n", ":1");
   expect_refused("name,x,y,z\na,1,2\n", ":2");
   expect_refused("name,x,y,z\na,1,2,three\n", "three");
+  expect_refused("name,x,y,z\na,1,nan,3\n", "nan");
   expect_refused("name,x,y,z\na,1,2,3\na,4,5,6\n", "twice");
   EXPECT_THROW(read_landmarks("no-such-file.csv"), InputError);
 }

@@ -179,6 +179,19 @@ const std::vector<BadInput> case_and_model = {
      in_file("model.toml", "= 20\nthick", "= -20\nthick"),
      {"model.toml:", "young_modulus_kpa = -20", "kPa"}},
     {"PoissonAHalf", "simulate", in_file("model.toml", "0.45", "0.5"), {"model.toml:", "poisson_ratio = 0.5", "< 0.5"}},
+    {"LandmarkOutsideTheBody",
+     "simulate",
+     [](const fs::path& f) {
+       write_text(f / "prone.csv", "name,x,y,z\nnipple,500,0,0\n");
+       write_text(f / "case.toml", read_text(f / "case.toml") + "\n[landmarks]\nprone = \"prone.csv\"\n");
+     },
+     {"prone.csv", "nipple", "outside", "bound 10 mm"}},
+    {"EffectThatCannotAct",
+     "simulate",
+     [](const fs::path& f) {
+       write_text(f / "model.toml", read_text(f / "model.toml") + "\n[[effect]]\nname = \"tumour_stiffness\"\n");
+     },
+     {"tumour_stiffness", "cannot change anything"}},
     {"ModelNotThere", "simulate", [](const fs::path& f) { fs::remove(f / "model.toml"); }, {"model.toml"}},
     {"MeshTruncated", "simulate", [](const fs::path& f) { cut_short(f / "out/mesh.vtu"); }, {"mesh.vtu"}},
 };

@@ -92,6 +92,7 @@ TEST_F(Make, SkipsTheComparisonWhereThereIsNoScanAndSaysSo) {
   const Finished finished = make();
   EXPECT_EQ(finished.code, 0) << finished.err;
   expect_words(finished.out, {"compare is skipped"});
+  EXPECT_FALSE(contains(finished.out, "MAE")) << "figures of an earlier comparison: " << finished.out;
   EXPECT_FALSE(fs::exists(out() / "comparison.vtp"));
   EXPECT_EQ(make({"compare"}).code, 2);
 }

@@ -151,6 +151,58 @@ TEST(Chain, ProneGravityIntoTheMuscleIsRefused) {
   EXPECT_THROW(chain.solve({{"prone", -Eigen::Vector3d::UnitZ()}, {"supine", Eigen::Vector3d::UnitZ()}}), InputError);
 }
 
+TEST(Chain, TheOrderOfEffectsInTheModelChangesNothing) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const EffectSetting ligament{"ligament", {{"stiffness_kpa_per_mm", Setting{0.4}}}, {}};
+  const EffectSetting adhesion{"adhesion", {{"log_factor", Setting{2}}}, {}};
+  Model one = testing::soft_model(), other = one;
+  one.effects = {ligament, adhesion};
+  other.effects = {adhesion, ligament};
+  EXPECT_EQ(solve_chain(scene.mesh, scene.anatomy, one, dome_poses).poses[0].x,
+            solve_chain(scene.mesh, scene.anatomy, other, dome_poses).poses[0].x);
+}
+
+TEST(Chain, RigidLigamentHoldsItsRing) {
+  const testing::TestScene& scene = testing::dome_scene();
+  Model model = testing::soft_model();
+  model.effects = {{"ligament", {}, {{"tie", "rigid"}}}};
+  const ChainSolution solution = solve_chain(scene.mesh, scene.anatomy, model, dome_poses);
+  EXPECT_LE(solution.round_trip_max_mm, 1e-6);
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  double ring = 0, inside = 0;  // largest way from undeformed to supine
+  for (const int face : layout.interface.faces)
+    for (const int n : scene.mesh.faces.row(face)) {
+      const double moved = (solution.poses[0].x.row(n) - solution.X.row(n)).norm();
+      const double from_foot = scene.anatomy.from_foot_mm(scene.anatomy.q.row(n).transpose());
+      if (std::abs(from_foot) < 2) ring = std::max(ring, moved);
+      if (from_foot < -25) inside = std::max(inside, moved);
+    }
+  EXPECT_LT(ring, 1e-3);
+  EXPECT_GT(inside, 0.1);
+}
+
+TEST(Chain, EffectsThatCannotActAreRefused) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const auto expect_refused = [&scene](const Model& model, const char* word) {
+    try {
+      solve_chain(scene.mesh, scene.anatomy, model, dome_poses);
+      FAIL() << "accepted: " << model.effects[0].name;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(model.effects[0].name), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
+    }
+  };
+  Model model = testing::soft_model(BulkLaw::corotational, SkinLaw::corotational);
+  model.effects = {{"strain_stiffening", {}, {}}};
+  expect_refused(model, "neo_hookean");
+  model = testing::soft_model();
+  model.effects = {{"tumour_stiffness", {}, {}}};
+  expect_refused(model, "no tissue of its kind");
+  model.effects = {{"adhesion", {}, {}}};
+  model.interface.kind = InterfaceKind::fixed;
+  expect_refused(model, "fixed");
+}
+
 TEST(Chain, QrNeedsLinearCells) {
   const testing::TestScene& scene = testing::dome_scene(2);
   EXPECT_THROW(solve_chain(scene.mesh, scene.anatomy, testing::soft_model(BulkLaw::corotational_qr), dome_poses),

@@ -54,6 +54,7 @@ class TermsTest : public ::testing::TestWithParam<Case> {
 
   double energy(const Points& now, const Points& rest) {
     mechanics->evaluate({now, rest}, Demand{.energy = true}, *sums);
+    EXPECT_TRUE(sums->valid);
     return sums->energy;
   }
   Eigen::VectorXd residual(const Points& now, const Points& rest) {

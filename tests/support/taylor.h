@@ -24,6 +24,7 @@ double taylor_order(const F& f, const Slope& slope, double h = 1e-2, int halving
   for (int i = 0; i < halvings; ++i) {
     h /= 2;
     const double now = remainder(h);
+    if (!(now > 0) || !std::isfinite(previous)) return -1e300;  // not a number, or nothing to measure
     order = std::min(order, std::log2(previous / now));
     previous = now;
   }
