@@ -37,6 +37,9 @@ build: setup
 
 demo: build
 	$(run_case) CASE=samples/ligament
+	@echo
+	@echo "The RMS is well above the scanner's noise on purpose: this patient has a ligament that the model lacks. Give it one:"
+	@echo "  cp -r samples/ligament mycase && $(BUILD)/bin/supine-model add ligament mycase/model.toml && make CASE=mycase"
 
 test: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel 2

@@ -32,11 +32,12 @@ row "sag, undeformed to supine, most" mm %.2f "$(figure supine.json .displacemen
 row "way from prone to supine, most" mm %.2f "$(figure supine.json .displacement_from_prone_mm.max)"
 row "round trip to the imaged shape" mm %.1e "$(figure supine.json .round_trip_max_mm)"
 if [[ " $* " == *"/comparison.vtp "* ]] && [ -f "$out/comparison.json" ]; then
-  row "MAE (model to scan, study)" mm %.2f "$(figure comparison.json .mae_study_mm)"
-  row "MAE (scan to model)" mm %.2f "$(figure comparison.json .mae_mm)"
+  row "MAE, model to scan (the study's)" mm %.2f "$(figure comparison.json .mae_study_mm)"
+  row "MAE, scan to model" mm %.2f "$(figure comparison.json .mae_mm)"
   row "RMS" mm %.2f "$(figure comparison.json .rms_mm)"
   row "95th percentile" mm %.2f "$(figure comparison.json .p95_mm)"
   row "maximum" mm %.2f "$(figure comparison.json .hausdorff_mm)"
+  row "scanner noise, 1 sigma" mm %.2f "$(figure comparison.json .noise_mm)"
 fi
 for comparison in "$@"; do
   file=${comparison%.vtp}.json

@@ -43,9 +43,13 @@ int use_threads(int wanted) {
 }
 
 void say_options(const Run& run, const Tool& tool, const nlohmann::ordered_json& options) {
-  run.say(fmt::format("{} {}", tool.name(), supine_version()));
-  for (const auto& [name, value] : options.items())
-    run.say(fmt::format("  {} = {}", name, value.is_string() ? value.get<std::string>() : value.dump()));
+  std::string line;
+  for (const auto& [name, value] : options.items()) {
+    if (value.empty() || value == false || value == "") continue;
+    line += fmt::format("{}{} = {}", line.empty() ? ": " : ", ", name,
+                        value.is_string() ? value.get<std::string>() : value.dump());
+  }
+  run.say(fmt::format("{} {}{}", tool.name(), supine_version(), line));
 }
 
 int work(Tool& tool, const CLI::App& app, const CommonOptions& common) {

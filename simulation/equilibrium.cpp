@@ -42,6 +42,7 @@ SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, P
   weight_norm_ = sums_.residual.norm();
   SolveReport report;
   factorisations_ = 0;
+  what_ = what;
   double load = 0, step = 1;
   Points at_load = sought, trial;
   Attempt last;
@@ -157,7 +158,7 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
   for (int iteration = 0;; ++iteration) {
     note_state(attempt);
     if (!sums_.valid) return give_up("an element is inverted");
-    if (options_.progress) options_.progress(load, iteration, attempt.residual_share);
+    if (options_.progress) options_.progress(what_, load, iteration, attempt.residual_share);
     const double moved = iteration == 0 ? longest_step_mm : step.cwiseAbs().maxCoeff();
     attempt.converged = attempt.residual_share <= options_.residual_tolerance ||
                         (moved < options_.step_tolerance_mm && exact_direction_);

@@ -15,7 +15,8 @@ struct SolveOptions {
   double step_tolerance_mm = 1e-8;    ///< the last Newton step moved no node further
   double residual_tolerance = 1e-11;  ///< or |r| is under this share of the weight
   double smallest_load_step = 1.0 / 128;
-  std::function<void(double load, int iteration, double residual_share)> progress;  ///< may be empty
+  /// Told at every iteration which solve is under way; may be empty.
+  std::function<void(const std::string& what, double load, int iteration, double residual_share)> progress;
 };
 
 struct SolveReport {
@@ -68,6 +69,7 @@ class EquilibriumSolver {
   std::unique_ptr<LuSolver> lu_;
   double weight_norm_ = 0;
   int factorisations_ = 0;
+  std::string what_;             // the solve under way, for progress and messages
   bool exact_direction_ = true;  // the last step came from the exact tangent: its length says how far the answer is
 };
 

@@ -35,15 +35,15 @@ struct EffectSetting {
 /// model.toml: what is believed. Units in the names; moduli are Young's.
 struct Model {
   struct {
-    BulkLaw law = BulkLaw::corotational;
-    Setting young_modulus_kpa{0.30};
+    BulkLaw law = BulkLaw::neo_hookean;
+    Setting young_modulus_kpa{0.5};
     Setting poisson_ratio{0.45};
     Setting density_kg_m3{1000};
     DensityReference density_refers_to = DensityReference::imaged;
   } breast;
   struct {
-    SkinLaw law = SkinLaw::corotational;
-    Setting young_modulus_kpa{22.72};
+    SkinLaw law = SkinLaw::neo_hookean;
+    Setting young_modulus_kpa{20};
     Setting thickness_mm{1.5};
     Compression compression = Compression::tension_field;
     Setting compression_share{0.05};

@@ -80,6 +80,7 @@ class CompareTool : public Tool {
                               {"scan_points_used", comparison.scan_points_used},
                               {"scan_triangles", scan.distance().triangles().rows()}};
     say(run, inputs.pose, comparison, landmarks);
+    doubt(run, scan_name, comparison);
     return Outcome::done;
   }
 
@@ -156,6 +157,16 @@ class CompareTool : public Tool {
     for (const auto& landmark : landmarks) {
       figures["landmarks"].push_back({{"name", landmark.name}, {"error_mm", landmark.error_mm}});
     }
+  }
+
+  // A scan that covers little of the skin or lies far from it is more likely somebody else's than a finding.
+  static void doubt(Run& run, const std::string& scan_name, const Comparison& comparison) {
+    constexpr double low_coverage = 0.5, far_mm = 8;
+    if (comparison.covered_fraction >= low_coverage && comparison.scan.median_mm <= far_mm) return;
+    run.warn(fmt::format(
+        "{} hardly fits this body: it covers {:.0f} % of the skin (usual: over {:.0f} %), half of its points lie more "
+        "than {:.1f} mm off. Another patient or side, a scan that is not registered, or a model far from the truth?",
+        scan_name, 100 * comparison.covered_fraction, 100 * low_coverage, comparison.scan.median_mm));
   }
 
   static void say(const Run& run, const Pose& pose, const Comparison& comparison,

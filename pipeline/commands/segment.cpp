@@ -110,6 +110,8 @@ class SegmentTool : public Tool {
     run.progress("reading " + file);
     segmentation::ImageFile volume = read_volume(measured.image_file, measured, run);
     findings.file_frame = volume.frame;
+    if (volume.frame.empty())
+      run.warn(fmt::format("the volume names no patient frame; taken as {} (case.frame)", measured.frame));
     if (measured.image_kind == "labels") {
       run.stage("map");
       segmentation::MappedLabels mapped = segmentation::map_labels(volume.image, measured.labels, file);

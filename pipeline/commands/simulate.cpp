@@ -83,9 +83,9 @@ class SimulateTool : public Tool {
     const Inputs in = read(run);
     run.stage("solve");
     simulation::SolveOptions options;
-    options.progress = [&run](double load, int iteration, double share) {
-      run.progress(
-          fmt::format("load {:.2f}, iteration {}: {:.1e} of the weight out of balance", load, iteration, share));
+    options.progress = [&run](const std::string& what, double load, int iteration, double share) {
+      run.progress(fmt::format("{}: load {:.0f} %, iteration {}, {:.1e} of the weight unbalanced", what, 100 * load,
+                               iteration, share));
     };
     const ChainSolution solution =
         simulation::solve_chain(in.mesh, in.anatomy, in.model, in.loads, inverse_methods.at(inverse_), options);

@@ -163,6 +163,9 @@ class TetrahedraliseTool : public Tool {
                            q.cells, options_.cells, q.faces));
       outcome = Outcome::target_not_met;
     }
+    if (check_ && outcome == Outcome::done)
+      run.say(fmt::format("good: no tetrahedron is inverted, smallest dihedral angle {:.1f} degrees (bound {})",
+                          q.min_dihedral_deg, good_dihedral_deg));
     return outcome;
   }
 

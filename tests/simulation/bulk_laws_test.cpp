@@ -38,7 +38,9 @@ TEST_P(BulkLawTest, NoStressAndNoEnergyAtRestOrUnderRotation) {
   const Matrix3 turn = Eigen::AngleAxisd(0.9, Eigen::Vector3d(1, -1, 3).normalized()).toRotationMatrix();
   for (const Matrix3& f : {Matrix3(Matrix3::Identity()), turn}) {
     EXPECT_LT(stress(f).norm(), 1e-13);
-    if (has_energy) EXPECT_NEAR(bulk_energy(law, f, material), 0, 1e-13);
+    if (has_energy) {
+      EXPECT_NEAR(bulk_energy(law, f, material), 0, 1e-13);
+    }
   }
 }
 
@@ -62,7 +64,9 @@ TEST_P(BulkLawTest, TangentIsTheDerivativeOfTheStress) {
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(flat.data());
   ASSERT_GT(slope.norm(), 1e-3);
   EXPECT_GT(taylor_order([&](double h) { return stress(f + h * v); }, Matrix3(slope)), 1.9);
-  if (has_energy) EXPECT_LT((a - a.transpose()).norm(), 1e-12 * a.norm());
+  if (has_energy) {
+    EXPECT_LT((a - a.transpose()).norm(), 1e-12 * a.norm());
+  }
 }
 
 TEST_P(BulkLawTest, StressTurnsWithTheBody) {

@@ -60,7 +60,9 @@ TEST_P(SkinLawTest, RelaxedNeverExceedsFullAndAgreesWhereTaut) {
       const double relaxed = skin_energy<double>(settings(GetParam(), Compression::tension_field, 0), c).psi;
       EXPECT_LE(relaxed, full + 1e-12);
       EXPECT_GE(relaxed, 0);
-      if (l2 >= 1) EXPECT_NEAR(relaxed, full, 1e-12);
+      if (l2 >= 1) {
+        EXPECT_NEAR(relaxed, full, 1e-12);
+      }
     }
 }
 
