@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 
 extern "C" char* openblas_get_corename(void);
@@ -20,7 +21,9 @@ void use_fitting_blas_kernels(char** argv) {
   const bool wide = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
                     __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
   setenv(variable, wide ? "SkylakeX" : "Haswell", 1);
-  execv("/proc/self/exe", argv);
+  std::error_code unknown;  // by its own path, so that it keeps its name in the list of processes
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", unknown);
+  if (!unknown) execv(program.c_str(), argv);
 #else
   (void)argv;
 #endif
