@@ -7,6 +7,7 @@
 #include "common/error.h"
 #include "pipeline/case.h"
 #include "pipeline/tool.h"
+#include "segmentation/data_file.h"
 #include "segmentation/image_io.h"
 #include "segmentation/label_map.h"
 #include "segmentation/labels_io.h"
@@ -133,6 +134,7 @@ class SegmentTool : public Tool {
                       ".nii.gz file (for example with 3D Slicer or dcm2niix)",
                       file.string()));
     segmentation::ImageFile volume = segmentation::read_image(run.input(file), measured.frame);
+    if (const auto voxels = segmentation::detached_data_file(file)) run.input(*voxels);
     for (const auto& warning : volume.warnings) run.warn(warning);
     return volume;
   }
