@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "common/error.h"
 
 namespace supine::simulation {
@@ -11,7 +13,9 @@ namespace {
 constexpr double sufficient_decrease = 1e-4;  // Armijo constant
 constexpr int max_halvings = 12;
 constexpr double longest_step_mm = 40;  // a Newton step beyond this is shortened before the line search
-constexpr double largest_fall = 0.1;    // det F may fall to this share of its value in one step
+constexpr int stall_window = 12;        // iterations in which the residual must fall to stall_share of what it was
+constexpr double stall_share = 0.5;
+constexpr double largest_fall = 0.1;  // det F may fall to this share of its value in one step
 
 using Flat = Eigen::Map<Eigen::VectorXd>;
 
@@ -153,7 +157,11 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
     attempt.reason = std::move(reason);
     return attempt;
   };
+  const auto stalled = [](int iteration, double share) {
+    return fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iteration, share);
+  };
   Eigen::VectorXd step;
+  double at_window = std::numeric_limits<double>::infinity();  // residual when the present window of iterations began
   evaluate(unknown, known, sought, load);
   for (int iteration = 0;; ++iteration) {
     note_state(attempt);
@@ -163,9 +171,11 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
     attempt.converged = attempt.residual_share <= options_.residual_tolerance ||
                         (moved < options_.step_tolerance_mm && exact_direction_);
     if (attempt.converged) return attempt;
-    if (iteration == options_.max_iterations)
-      return give_up(fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iteration,
-                                 attempt.residual_share));
+    if (iteration % stall_window == 0) {
+      if (attempt.residual_share > stall_share * at_window) return give_up(stalled(iteration, attempt.residual_share));
+      at_window = attempt.residual_share;
+    }
+    if (iteration == options_.max_iterations) return give_up(stalled(iteration, attempt.residual_share));
     ++attempt.iterations;
     if (!direction(unknown, state_of(unknown, known, sought, load), step))
       return give_up("the tangent matrix is singular");
