@@ -15,7 +15,8 @@ constexpr int max_halvings = 12;
 constexpr double longest_step_mm = 40;  // a Newton step beyond this is shortened before the line search
 constexpr int stall_window = 12;        // iterations in which the residual must fall to stall_share of what it was
 constexpr double stall_share = 0.5;
-constexpr double largest_fall = 0.1;  // det F may fall to this share of its value in one step
+constexpr double loosest_residual = 1e-4;  // stiff ties leave rounding behind; more than this is no equilibrium
+constexpr double largest_fall = 0.1;       // det F may fall to this share of its value in one step
 
 using Flat = Eigen::Map<Eigen::VectorXd>;
 
@@ -168,8 +169,9 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
     if (!sums_.valid) return give_up("an element is inverted");
     if (options_.progress) options_.progress(what_, load, iteration, attempt.residual_share);
     const double moved = iteration == 0 ? longest_step_mm : step.cwiseAbs().maxCoeff();
-    attempt.converged = attempt.residual_share <= options_.residual_tolerance ||
-                        (moved < options_.step_tolerance_mm && exact_direction_);
+    attempt.converged =
+        attempt.residual_share <= options_.residual_tolerance ||
+        (moved < options_.step_tolerance_mm && exact_direction_ && attempt.residual_share <= loosest_residual);
     if (attempt.converged) return attempt;
     if (iteration % stall_window == 0) {
       if (attempt.residual_share > stall_share * at_window) return give_up(stalled(iteration, attempt.residual_share));

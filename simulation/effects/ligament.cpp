@@ -30,7 +30,6 @@ bool in_arc(const std::string& arc, const Eigen::Vector2d& q) {
 
 // The study ties each node of the ring with compliance 1e-8 m/N, that is 1e8 mN/mm: spread over the ring's area.
 double rigid_stiffness(const Scene& scene, const Eigen::VectorXd& weight) {
-  double nodes = 0;
   const double area = weight.dot(scene.layout.interface.area_mm2);
   Eigen::VectorXd node_weight = Eigen::VectorXd::Zero(scene.mesh.points.rows());
   const auto& group = scene.layout.interface;
@@ -41,8 +40,7 @@ double rigid_stiffness(const Scene& scene, const Eigen::VectorXd& weight) {
         double& w = node_weight[scene.mesh.faces(group.faces[f], a)];
         w = std::max(w, weight[f * per_face + p]);
       }
-  nodes = node_weight.sum();
-  return area > 0 ? 1e8 * nodes / area : 0;
+  return area > 0 ? 1e8 * node_weight.sum() / area : 0;
 }
 
 }  // namespace

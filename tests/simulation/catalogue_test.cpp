@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "common/error.h"
 #include "simulation/mechanics.h"
 #include "tests/simulation/scene.h"
@@ -133,10 +135,19 @@ TEST(Ligament, RigidTieReproducesTheStudysCompliance) {
   model.effects.push_back({"ligament", {}, {{"tie", "rigid"}}});
   const auto fields = values_of(make_fields(model, {scene.mesh, scene.anatomy, layout, "supine"}, {0, 1, 0}));
   const Eigen::VectorXd added = fields.interface_normal.array() - model.interface.normal_kpa_per_mm.value;
-  // Total stiffness over the ring in mN/mm, against 1e8 for each of its some dozen nodes.
-  const double total = added.dot(layout.interface.area_mm2);
-  EXPECT_GT(total, 1e8 * 10);
-  EXPECT_LT(total, 1e8 * static_cast<double>(scene.mesh.points.rows()));
+  const Eigen::VectorXd sideways = fields.interface_tangential.array() - model.interface.tangential_kpa_per_mm.value;
+  EXPECT_LT((added - sideways).norm(), 1e-6 * added.norm());
+  // Total stiffness over the ring in mN/mm: 1e8 for each node that is wholly inside, less for those at its edges.
+  const double total = added.dot(layout.interface.area_mm2), full = added.maxCoeff();
+  std::set<int> touched, inside;
+  for (Eigen::Index f = 0; f < layout.interface.faces.size(); ++f)
+    for (const int n : scene.mesh.faces.row(layout.interface.faces[f])) {
+      if (added.segment<3>(3 * f).maxCoeff() > 0) touched.insert(n);
+      if (added.segment<3>(3 * f).maxCoeff() > 0.999 * full) inside.insert(n);
+    }
+  ASSERT_GT(inside.size(), 10u);
+  EXPECT_GE(total, 1e8 * static_cast<double>(inside.size()) * (1 - 1e-9));
+  EXPECT_LE(total, 1e8 * static_cast<double>(touched.size()) * (1 + 1e-9));
 }
 
 TEST(MakeFields, UnknownEffectIsRefused) {

@@ -163,6 +163,26 @@ TEST_P(TermsTest, InvertedElementsAreReported) {
   EXPECT_GE(sums->min_cell, 0);
 }
 
+// A body moved as a whole off a plane muscle: only the springs carry, and their forces are stiffness × area × way.
+TEST(Springs, CarryStiffnessTimesAreaTimesWay) {
+  const testing::TestScene scene = testing::box_scene(2, {60, 50, 40});
+  Model model = testing::soft_model();
+  model.interface.tangential_kpa_per_mm.value = 0.2;
+  Mechanics mechanics(scene.mesh, scene.anatomy, model);
+  mechanics.set_fields(values_of(
+      make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics.layout(), "prone"}, Eigen::Vector3d::Zero())));
+  Sums sums(mechanics.pattern());
+  const Points& X = scene.mesh.points;
+  const Points x = X.rowwise() + Eigen::RowVector3d(0.3, 0, 0.5);
+  mechanics.evaluate({x, X}, Demand{.energy = true, .residual = true}, sums);
+  const double base = 60 * 50, sides = 2 * (60 + 50) * 40;  // mm²; cut springs 1 kPa/mm on the sides
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  for (Eigen::Index n = 0; n < X.rows(); ++n) force += sums.residual.segment<3>(3 * n);
+  EXPECT_NEAR(force.x(), (0.2 * base + 1.0 * sides) * 0.3, 1e-3);
+  EXPECT_NEAR(force.z(), (3.0 * base + 1.0 * sides) * 0.5, 1e-3);
+  EXPECT_NEAR(sums.energy, 0.5 * ((0.2 * base + sides) * 0.09 + (3.0 * base + sides) * 0.25), 1e-3);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     All, TermsTest,
     ::testing::Values(
