@@ -9,6 +9,7 @@
 #include "common/error.h"
 #include "pipeline/toml_reader.h"
 #include "simulation/catalogue.h"
+#include "simulation/parameters.h"
 
 namespace supine::pipeline {
 namespace {
@@ -16,26 +17,6 @@ namespace {
 using simulation::Model;
 using simulation::Parameter;
 using simulation::Setting;
-
-constexpr double default_skin_poisson_ratio = 0.45;
-
-/// The member of Model that the base row @p name ("section.key") stands for.
-Setting& base_setting(Model& model, const std::string& name) {
-  if (name == "breast.young_modulus_kpa") return model.breast.young_modulus_kpa;
-  if (name == "breast.poisson_ratio") return model.breast.poisson_ratio;
-  if (name == "breast.density_kg_m3") return model.breast.density_kg_m3;
-  if (name == "skin.young_modulus_kpa") return model.skin.young_modulus_kpa;
-  if (name == "skin.thickness_mm") return model.skin.thickness_mm;
-  if (name == "skin.compression_share") return model.skin.compression_share;
-  if (name == "skin.poisson_ratio") {
-    if (!model.skin.poisson_ratio) model.skin.poisson_ratio = Setting{default_skin_poisson_ratio};
-    return *model.skin.poisson_ratio;
-  }
-  if (name == "interface.normal_kpa_per_mm") return model.interface.normal_kpa_per_mm;
-  if (name == "interface.tangential_kpa_per_mm") return model.interface.tangential_kpa_per_mm;
-  if (name == "cut.stiffness_kpa_per_mm") return model.cut.stiffness_kpa_per_mm;
-  throw Error("base parameter without a place in the model: " + name);
-}
 
 std::string with_unit(double value, const Parameter& row) {
   return row.unit.empty() || row.unit == "1" ? fmt::format("{}", value) : fmt::format("{} {}", value, row.unit);

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "common/error.h"
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
 #include "simulation/elements.h"
+#include "simulation/parameters.h"
 #include "simulation/surface_geometry.h"
 
 namespace supine::simulation {
@@ -73,34 +75,51 @@ Layout layout_of(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy) 
   return layout;
 }
 
-Fields<Dual> base_fields(const Model& model, const Layout& layout, const Eigen::Vector3d& gravity) {
-  using Column = Fields<Dual>::Column;
-  const auto constant = [](Eigen::Index size, double value) { return Column::Constant(size, Dual(value)).eval(); };
-  const Eigen::Index cells = layout.cell_q.rows(), skin = layout.skin.faces.size();
+Fields<Dual> base_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity,
+                         const std::string& varied) {
+  const Layout& layout = scene.layout;
+  const Eigen::Index cells = layout.cell_q.rows(), skin = layout.skin.faces.size(), contact = layout.interface.q.rows();
+  const auto number = [&model, &varied](const char* name) {
+    Dual value(base_setting(model, name).value);
+    if (varied == name) value.v[0] = 1;
+    return value;
+  };
+  const auto constant = [](Eigen::Index size, const Dual& value) {
+    return Fields<Dual>::Column::Constant(size, value).eval();
+  };
   Fields<Dual> fields;
-  fields.ln_young = constant(cells, std::log(model.breast.young_modulus_kpa.value));
-  fields.poisson = constant(cells, model.breast.poisson_ratio.value);
-  fields.stiffening = constant(cells, 0.0);
-  fields.skin_modulus = constant(skin, model.skin.young_modulus_kpa.value * model.skin.thickness_mm.value);
-  fields.skin_prestretch = constant(skin, 1.0);
-  fields.interface_normal = constant(layout.interface.q.rows(), model.interface.normal_kpa_per_mm.value);
-  fields.interface_tangential = constant(layout.interface.q.rows(), model.interface.tangential_kpa_per_mm.value);
-  fields.cut_stiffness = constant(layout.cut.q.rows(), model.cut.stiffness_kpa_per_mm.value);
-  for (int i = 0; i < 3; ++i) fields.gravity[i] = Dual(gravity_mm_s2 * gravity[i]);
-  fields.density = Dual(model.breast.density_kg_m3.value * 1e-9);  // kg/m³ → kg/mm³
+  fields.ln_young = constant(cells, ceres::log(number("breast.young_modulus_kpa")));
+  fields.poisson = constant(cells, number("breast.poisson_ratio"));
+  fields.density = constant(cells, number("breast.density_kg_m3") * 1e-9);  // kg/m³ → kg/mm³
+  fields.skin_modulus = constant(skin, number("skin.young_modulus_kpa") * number("skin.thickness_mm"));
+  fields.skin_poisson = constant(skin, number("skin.poisson_ratio"));
+  fields.skin_compression = constant(skin, number("skin.compression_share"));
+  fields.skin_prestretch = constant(skin, Dual(1.0));
+  fields.interface_normal = constant(contact, number("interface.normal_kpa_per_mm"));
+  fields.interface_tangential = constant(contact, number("interface.tangential_kpa_per_mm"));
+  fields.cut_stiffness = constant(layout.cut.q.rows(), number("cut.stiffness_kpa_per_mm"));
+  fields.stiffening = fields.fibre_modulus = constant(cells, Dual(0.0));
+  fields.skin_stiffening = constant(skin, Dual(0.0));
+  fields.skin_traction = constant(3 * skin, Dual(0.0));
+  fields.interface_friction = fields.muscle_offset = constant(contact, Dual(0.0));
+  fields.imaged_offset = constant(3 * scene.mesh.points.rows(), Dual(0.0));
+  fields.scan_motion = constant(6, Dual(0.0));
+  fields.gravity = (gravity_mm_s2 * gravity).cast<Dual>();
   return fields;
 }
 
-void apply_effect(const Effect& effect, const EffectSetting& setting, const Scene& scene, Fields<Dual>& fields) {
-  std::vector<Dual> parameter_values;
+void apply_effect(const Effect& effect, const EffectSetting& setting, const Scene& scene, const std::string& varied,
+                  Fields<Dual>& fields) {
+  std::vector<Dual> values;
   for (const Parameter& row : effect.parameters()) {
     const auto found = setting.parameters.find(row.name);
-    parameter_values.emplace_back(found != setting.parameters.end() ? found->second.value : row.median);
+    values.emplace_back(found != setting.parameters.end() ? found->second.value : row.median);
+    if (varied == parameter_name(effect, row)) values.back().v[0] = 1;
   }
   std::map<std::string, std::string> options;
   for (const OptionRow& row : effect.options()) options[row.name] = row.default_value;
   for (const auto& [name, value] : setting.options) options[name] = value;
-  effect.apply(scene, parameter_values, options, fields);
+  effect.apply(scene, values, options, fields);
 }
 
 /// The same effect with every parameter that stands at its null moved to an ordinary size.
@@ -114,9 +133,11 @@ EffectSetting with_typical_values(EffectSetting setting) {
   return setting;
 }
 
-Eigen::VectorXd values(const Fields<Dual>::Column& column) {
-  Eigen::VectorXd out(column.size());
-  for (Eigen::Index i = 0; i < column.size(); ++i) out[i] = column[i].a;
+template <class Part>
+Fields<double> each_entry(const Fields<Dual>& fields, const Part& part) {
+  Fields<double> out;
+  for (std::size_t c = 0; c < std::size(field_columns<Dual>); ++c)
+    out.*field_columns<double>[c].column = (fields.*field_columns<Dual>[c].column).unaryExpr(part);
   return out;
 }
 
@@ -126,14 +147,24 @@ Layout make_layout(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy
   return mesh.order() == 2 ? layout_of<Tri6>(mesh, anatomy) : layout_of<Tri3>(mesh, anatomy);
 }
 
-Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity) {
+Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity,
+                         const std::string& varied) {
   for (const EffectSetting& setting : model.effects)
     if (find_effect(setting.name) == nullptr)
       throw InputError(fmt::format("effect '{}' is not in the catalogue", setting.name));
-  Fields<Dual> fields = base_fields(model, scene.layout, gravity);
-  for (const Effect* effect : catalogue())
+  if (!varied.empty() && find_parameter(varied) == nullptr)
+    throw InputError(fmt::format("there is no parameter '{}' in the base model or the catalogue", varied));
+  Fields<Dual> fields = base_fields(model, scene, gravity, varied);
+  for (const Effect* effect : catalogue()) {
+    bool present = false;
     for (const EffectSetting& setting : model.effects)
-      if (setting.name == effect->name()) apply_effect(*effect, setting, scene, fields);
+      if (setting.name == effect->name()) {
+        apply_effect(*effect, setting, scene, varied, fields);
+        present = true;
+      }
+    if (!present && varied.starts_with(effect->name() + "."))
+      apply_effect(*effect, null_setting(*effect), scene, varied, fields);
+  }
   return fields;
 }
 
@@ -146,12 +177,17 @@ void check_effects_act(const Model& model, const Scene& scene) {
     const Eigen::Vector3d gravity = Eigen::Vector3d(1, 2, 3).normalized();  // no rotation leaves it as it is
     const auto with = values_of(make_fields(alone, scene, gravity));
     const auto base = values_of(make_fields(without, scene, gravity));
-    const bool on_interface =
-        with.interface_normal != base.interface_normal || with.interface_tangential != base.interface_tangential;
-    const bool elsewhere = with.ln_young != base.ln_young || with.poisson != base.poisson ||
-                           with.skin_modulus != base.skin_modulus || with.skin_prestretch != base.skin_prestretch ||
-                           with.cut_stiffness != base.cut_stiffness || with.gravity != base.gravity;
-    const bool on_stiffening = with.stiffening != base.stiffening;
+    std::set<std::string> changed;
+    for (std::size_t c = 0; c < std::size(field_columns<double>); ++c)
+      if (with.*field_columns<double>[c].column != base.*field_columns<double>[c].column)
+        changed.insert(field_columns<double>[c].name);
+    const bool on_interface = changed.contains("interface_normal") || changed.contains("interface_tangential") ||
+                              changed.contains("interface_friction") || changed.contains("muscle_offset");
+    const bool on_stiffening = changed.contains("stiffening");
+    const bool elsewhere = changed.size() > static_cast<std::size_t>(changed.contains("interface_normal") +
+                                                                     changed.contains("interface_tangential") +
+                                                                     changed.contains("interface_friction") +
+                                                                     changed.contains("muscle_offset") + on_stiffening);
     const auto refuse = [&setting](const char* reason) {
       throw InputError(fmt::format("effect '{}' cannot change anything here: {}", setting.name, reason));
     };
@@ -166,18 +202,11 @@ void check_effects_act(const Model& model, const Scene& scene) {
 }
 
 Fields<double> values_of(const Fields<Dual>& fields) {
-  Fields<double> out;
-  out.ln_young = values(fields.ln_young);
-  out.poisson = values(fields.poisson);
-  out.stiffening = values(fields.stiffening);
-  out.skin_modulus = values(fields.skin_modulus);
-  out.skin_prestretch = values(fields.skin_prestretch);
-  out.interface_normal = values(fields.interface_normal);
-  out.interface_tangential = values(fields.interface_tangential);
-  out.cut_stiffness = values(fields.cut_stiffness);
-  for (int i = 0; i < 3; ++i) out.gravity[i] = fields.gravity[i].a;
-  out.density = fields.density.a;
-  return out;
+  return each_entry(fields, [](const Dual& number) { return number.a; });
+}
+
+Fields<double> derivatives_of(const Fields<Dual>& fields) {
+  return each_entry(fields, [](const Dual& number) { return number.v[0]; });
 }
 
 }  // namespace supine::simulation

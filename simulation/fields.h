@@ -23,20 +23,57 @@ template <class T>
 struct Fields {
   using Column = Eigen::Matrix<T, Eigen::Dynamic, 1>;
 
-  Column ln_young;    ///< #cells; ln of Young's modulus in kPa
-  Column poisson;     ///< #cells; 0 to 0.5 exclusive
-  Column stiffening;  ///< #cells; b of the exponential law, >= 0
+  Column ln_young;       ///< #cells; ln of Young's modulus in kPa
+  Column poisson;        ///< #cells; 0 to 0.5 exclusive
+  Column stiffening;     ///< #cells; b of the exponential law, >= 0
+  Column fibre_modulus;  ///< #cells; k_f in kPa of fibres along the muscle's outward normal, >= 0
+  Column density;        ///< #cells; kg/mm³
 
-  Column skin_modulus;     ///< #skin faces; Young's modulus × thickness, kPa mm
-  Column skin_prestretch;  ///< #skin faces; stretch already there in the undeformed shape, 1 = none
+  Column skin_modulus;      ///< #skin faces; Young's modulus × thickness, kPa mm
+  Column skin_poisson;      ///< #skin faces; corotational law only
+  Column skin_compression;  ///< #skin faces; share of the full energy kept where the skin wrinkles
+  Column skin_prestretch;   ///< #skin faces; stretch already there in the undeformed shape, 1 = none
+  Column skin_stiffening;   ///< #skin faces; b of the exponential law, >= 0
+  Column skin_traction;     ///< 3 per skin face, xyz; dead load per undeformed area, kPa
 
   Column interface_normal;      ///< #interface points; kPa/mm
   Column interface_tangential;  ///< #interface points; kPa/mm
+  Column interface_friction;    ///< #interface points; Coulomb's coefficient
+  Column muscle_offset;         ///< #interface points; mm the muscle has come out along its normal in this pose
   Column cut_stiffness;         ///< #cut points; kPa/mm
 
-  Eigen::Matrix<T, 3, 1> gravity;  ///< mm/s², in the pose
-  T density;                       ///< kg/mm³
+  Column gravity;        ///< 3; mm/s², in the pose
+  Column imaged_offset;  ///< 3 per node, xyz; mm from the imaged nodes as given to where the true ones are
+  Column scan_motion;    ///< 6; translation in mm, then rotation vector in rad, of the scan about its centroid
 };
+
+template <class T>
+struct FieldColumn {
+  const char* name;
+  typename Fields<T>::Column Fields<T>::*column;
+};
+
+/// Every column, for what treats them alike.
+template <class T>
+inline constexpr FieldColumn<T> field_columns[] = {{"ln_young", &Fields<T>::ln_young},
+                                                   {"poisson", &Fields<T>::poisson},
+                                                   {"stiffening", &Fields<T>::stiffening},
+                                                   {"fibre_modulus", &Fields<T>::fibre_modulus},
+                                                   {"density", &Fields<T>::density},
+                                                   {"skin_modulus", &Fields<T>::skin_modulus},
+                                                   {"skin_poisson", &Fields<T>::skin_poisson},
+                                                   {"skin_compression", &Fields<T>::skin_compression},
+                                                   {"skin_prestretch", &Fields<T>::skin_prestretch},
+                                                   {"skin_stiffening", &Fields<T>::skin_stiffening},
+                                                   {"skin_traction", &Fields<T>::skin_traction},
+                                                   {"interface_normal", &Fields<T>::interface_normal},
+                                                   {"interface_tangential", &Fields<T>::interface_tangential},
+                                                   {"interface_friction", &Fields<T>::interface_friction},
+                                                   {"muscle_offset", &Fields<T>::muscle_offset},
+                                                   {"cut_stiffness", &Fields<T>::cut_stiffness},
+                                                   {"gravity", &Fields<T>::gravity},
+                                                   {"imaged_offset", &Fields<T>::imaged_offset},
+                                                   {"scan_motion", &Fields<T>::scan_motion}};
 
 /// Where the fields live: for each group of faces of the mesh, its faces and its quadrature points.
 struct FaceGroup {
@@ -57,15 +94,19 @@ Layout make_layout(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy
 /// The fields of @p model in one pose: base model first, then its effects in the order of the catalogue, whatever
 /// their order in the model.
 /// @param gravity  unit vector of the pose
-/// @throws InputError  an effect that is not in the catalogue
-Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity);
+/// @param varied   the parameter the derivatives are taken with respect to (parameters.h), of the base model or of any
+///   effect of the catalogue: one that is not in the model acts at its null. Empty: no derivatives.
+/// @throws InputError  an effect or parameter that does not exist
+Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity,
+                         const std::string& varied = {});
 
 /// Refuses effects that can change nothing here, so that nobody waits for them: no tissue of that kind, no interface
 /// point in the ring, a law or a boundary that does not read the field.
 /// @throws InputError  naming the effect and the reason
 void check_effects_act(const Model& model, const Scene& scene);
 
-/// The numbers without their derivatives.
+/// The numbers without their derivatives, and the derivatives alone.
 Fields<double> values_of(const Fields<Dual>& fields);
+Fields<double> derivatives_of(const Fields<Dual>& fields);
 
 }  // namespace supine::simulation

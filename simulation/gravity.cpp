@@ -12,17 +12,16 @@ GravityTerm<Element>::GravityTerm(const Indices& cells, const Pattern& pattern, 
 
 template <class Element>
 void GravityTerm<Element>::set_fields(const Fields<double>& fields) {
-  weight_ = fields.density * fields.gravity;
+  weight_ = fields.density * fields.gravity.transpose();
 }
 
 template <class Element>
-void GravityTerm<Element>::add_force(const State& state, const Eigen::Vector3d& weight, const Demand& demand,
-                                     Sums& sums) const {
+void GravityTerm<Element>::add_force(const State& state, const Points& weight, const Demand& demand, Sums& sums) const {
   constexpr int n = Element::nodes;
   const bool varies = reference_ == DensityReference::undeformed;
   const Points& shape = varies ? state.X : imaged_;
-  const Eigen::Vector3d pull = state.load * weight;
   add_elements<n>(elements_, demand, sums, [&](int e, auto& local) {
+    const Eigen::Vector3d pull = state.load * weight.row(e).transpose();
     const NodeRows<n> rest = gather<n>(shape, elements_.nodes(), e);
     const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e);
     for (int p = 0; p < Element::points; ++p) {
@@ -51,8 +50,9 @@ void GravityTerm<Element>::add(const State& state, const Demand& demand, Sums& s
 
 template <class Element>
 void GravityTerm<Element>::add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const {
-  Eigen::Vector3d derivative;
-  for (int i = 0; i < 3; ++i) derivative[i] = (fields.density * fields.gravity[i]).v[0];
+  Points derivative(elements_.count(), 3);
+  for (Eigen::Index e = 0; e < elements_.count(); ++e)
+    for (int i = 0; i < 3; ++i) derivative(e, i) = (fields.density[e] * fields.gravity[i]).v[0];
   add_force(state, derivative, Demand{.residual = true}, sums);
 }
 

@@ -19,12 +19,12 @@ class GravityTerm : public Term {
   void add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const override;
 
  private:
-  void add_force(const State& state, const Eigen::Vector3d& weight, const Demand& demand, Sums& sums) const;
+  void add_force(const State& state, const Points& weight, const Demand& demand, Sums& sums) const;
 
   Elements elements_;
   Points imaged_;
   DensityReference reference_;
-  Eigen::Vector3d weight_ = Eigen::Vector3d::Zero();  // density × gravity, mN/mm³
+  Points weight_;  // per cell: density × gravity, mN/mm³
 };
 
 extern template class GravityTerm<Tet4>;

@@ -14,15 +14,6 @@ namespace {
 
 Indices rows_of(const Indices& table, const Eigen::VectorXi& rows) { return table(rows, Eigen::all); }
 
-SkinSettings skin_settings(const Model& model) {
-  SkinSettings settings;
-  settings.law = model.skin.law;
-  settings.compression = model.skin.compression;
-  settings.compression_share = model.skin.compression_share.value;
-  if (model.skin.poisson_ratio) settings.poisson_ratio = model.skin.poisson_ratio->value;
-  return settings;
-}
-
 template <class Cell, class Face>
 std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy,
                                               const Model& model, const Layout& layout, const Pattern& pattern) {
@@ -31,8 +22,8 @@ std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, cons
   terms.push_back(
       std::make_unique<GravityTerm<Cell>>(mesh.cells, pattern, mesh.points, model.breast.density_refers_to));
   if (model.skin.young_modulus_kpa.value > 0)
-    terms.push_back(
-        std::make_unique<SkinTerm<Face>>(rows_of(mesh.faces, layout.skin.faces), pattern, skin_settings(model)));
+    terms.push_back(std::make_unique<SkinTerm<Face>>(rows_of(mesh.faces, layout.skin.faces), pattern,
+                                                     SkinSettings{model.skin.law, model.skin.compression}));
   if (model.interface.kind == InterfaceKind::sliding)
     terms.push_back(
         std::make_unique<InterfaceTerm<Face>>(rows_of(mesh.faces, layout.interface.faces), pattern, anatomy.muscle));

@@ -47,7 +47,7 @@ struct Model {
     Setting thickness_mm{1.5};
     Compression compression = Compression::tension_field;
     Setting compression_share{0.05};
-    std::optional<Setting> poisson_ratio;  ///< corotational skin only; default 0.45
+    Setting poisson_ratio{0.45};  ///< corotational skin only
   } skin;
   struct {
     InterfaceKind kind = InterfaceKind::sliding;

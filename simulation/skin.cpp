@@ -28,18 +28,18 @@ struct MembranePoint {
   Metric<T> stress;
 };
 
-template <class T>
-MembranePoint<T> membrane_point(const SkinSettings& settings, const Metric<T>& g, const Metric<T>& rest,
-                                const T& modulus, const T& prestretch) {
+template <class T, class S>
+MembranePoint<T> membrane_point(const SkinSettings& settings, const SkinMaterial<S>& material, const Metric<T>& g,
+                                const Metric<T>& rest) {
   using std::sqrt;
   const T det_g = determinant(g), det_rest = determinant(rest);
-  const T stretch2 = prestretch * prestretch;
+  const S stretch2 = material.prestretch * material.prestretch;
   // Adjugates: inverse times determinant.
   const Metric<T> adj_rest(rest[2], -rest[1], rest[0]), adj_g(g[2], -g[1], g[0]);
   const PlaneInvariants<T> c{stretch2 * (adj_rest[0] * g[0] + 2.0 * adj_rest[1] * g[1] + adj_rest[2] * g[2]) / det_rest,
                              stretch2 * stretch2 * det_g / det_rest};
-  const SkinEnergy<T> psi = skin_energy(settings, c);
-  const T scale = modulus * sqrt(det_rest);
+  const SkinEnergy<T> psi = skin_energy(settings, material, c);
+  const T scale = material.modulus * sqrt(det_rest);
   const T wa = scale * 2.0 * psi.psi_a * stretch2 / det_rest;
   const T wb = scale * 2.0 * psi.psi_b * stretch2 * stretch2 / det_rest;
   return {scale * psi.psi, wa * adj_rest + wb * adj_g};
@@ -79,15 +79,15 @@ struct MembraneTangent {
   Eigen::Matrix3d by_g, by_rest;  // ∂T/∂g and ∂T/∂G
 };
 
-MembraneTangent membrane_tangent(const SkinSettings& settings, const Metric<double>& g, const Metric<double>& rest,
-                                 double modulus, double prestretch) {
+MembraneTangent membrane_tangent(const SkinSettings& settings, const SkinMaterial<double>& material,
+                                 const Metric<double>& g, const Metric<double>& rest) {
   using Jet = ceres::Jet<double, 6>;
   Metric<Jet> gj, rest_j;
   for (int i = 0; i < 3; ++i) {
     gj[i] = Jet(g[i], i);
     rest_j[i] = Jet(rest[i], 3 + i);
   }
-  const auto point = membrane_point<Jet>(settings, gj, rest_j, Jet(modulus), Jet(prestretch));
+  const auto point = membrane_point<Jet>(settings, material, gj, rest_j);
   MembraneTangent result;
   result.energy = point.energy.a;
   for (int i = 0; i < 3; ++i) {
@@ -128,6 +128,11 @@ void add_membrane_tangent(const MembraneTangent& point, const Eigen::Matrix<doub
   }
 }
 
+template <class T>
+SkinMaterial<T> skin_material(const Fields<T>& fields, Eigen::Index e) {
+  return {fields.skin_modulus[e], fields.skin_poisson[e], fields.skin_compression[e], fields.skin_prestretch[e]};
+}
+
 }  // namespace
 
 template <class Face>
@@ -136,8 +141,8 @@ SkinTerm<Face>::SkinTerm(const Indices& faces, const Pattern& pattern, const Ski
 
 template <class Face>
 void SkinTerm<Face>::set_fields(const Fields<double>& fields) {
-  modulus_ = fields.skin_modulus;
-  prestretch_ = fields.skin_prestretch;
+  material_.resize(elements_.count());
+  for (Eigen::Index e = 0; e < elements_.count(); ++e) material_[e] = skin_material(fields, e);
 }
 
 template <class Face>
@@ -150,10 +155,10 @@ void SkinTerm<Face>::add_face(int e, const State& state, const Demand& demand, L
     const Eigen::Matrix<double, 3, 2> now = x.transpose() * gradient, before = rest.transpose() * gradient;
     MembraneTangent point;
     if (demand.tangent || demand.reference_tangent) {
-      point = membrane_tangent(settings_, metric(now), metric(before), modulus_[e], prestretch_[e]);
+      point = membrane_tangent(settings_, material_[e], metric(now), metric(before));
       add_membrane_tangent<n>(point, gradient, weight, now, before, demand, local);
     } else {
-      const auto plain = membrane_point<double>(settings_, metric(now), metric(before), modulus_[e], prestretch_[e]);
+      const auto plain = membrane_point<double>(settings_, material_[e], metric(now), metric(before));
       point.energy = plain.energy;
       point.stress = plain.stress;
     }
@@ -178,7 +183,7 @@ void SkinTerm<Face>::add_parameter_derivative(const State& state, const Fields<D
       const auto& gradient = Face::table().gradient[p];
       const Eigen::Matrix<double, 3, 2> now = x.transpose() * gradient, before = rest.transpose() * gradient;
       const Metric<Dual> g = metric(now).template cast<Dual>(), rest_g = metric(before).template cast<Dual>();
-      const auto point = membrane_point<Dual>(settings_, g, rest_g, fields.skin_modulus[e], fields.skin_prestretch[e]);
+      const auto point = membrane_point<Dual>(settings_, skin_material(fields, e), g, rest_g);
       const Metric<double> derivative(point.stress[0].v[0], point.stress[1].v[0], point.stress[2].v[0]);
       const auto force = membrane_force<n>(gradient, derivative, now, Face::table().weight[p]);
       for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += force.row(a).transpose();

@@ -25,7 +25,7 @@ class SkinTerm : public Term {
 
   Elements elements_;
   SkinSettings settings_;
-  Eigen::VectorXd modulus_, prestretch_;  // per face: kPa mm, 1
+  std::vector<SkinMaterial<double>> material_;  // per face
 };
 
 extern template class SkinTerm<Tri3>;

@@ -94,7 +94,7 @@ class ModelTool : public Tool {
     say("skin.young_modulus_kpa", model.skin.young_modulus_kpa);
     say("skin.thickness_mm", model.skin.thickness_mm);
     say("skin.compression_share", model.skin.compression_share);
-    if (model.skin.poisson_ratio) say("skin.poisson_ratio", *model.skin.poisson_ratio);
+    if (model.skin.law == simulation::SkinLaw::corotational) say("skin.poisson_ratio", model.skin.poisson_ratio);
     say("interface.normal_kpa_per_mm", model.interface.normal_kpa_per_mm);
     say("interface.tangential_kpa_per_mm", model.interface.tangential_kpa_per_mm);
     say("cut.stiffness_kpa_per_mm", model.cut.stiffness_kpa_per_mm);

@@ -17,9 +17,9 @@ void GravityTilt::apply(const Scene& scene, std::span<const Dual> values, const 
   if (scene.pose == "prone") return;
   const Dual cr = ceres::cos(values[0]), sr = ceres::sin(values[0]), cp = ceres::cos(values[1]),
              sp = ceres::sin(values[1]);
-  const Eigen::Matrix<Dual, 3, 1> g = fields.gravity;
-  const Eigen::Matrix<Dual, 3, 1> pitched(g.x(), cp * g.y() - sp * g.z(), sp * g.y() + cp * g.z());
-  fields.gravity = {cr * pitched.x() - sr * pitched.y(), sr * pitched.x() + cr * pitched.y(), pitched.z()};
+  const auto g = fields.gravity;
+  const Eigen::Matrix<Dual, 3, 1> pitched(g[0], cp * g[1] - sp * g[2], sp * g[1] + cp * g[2]);
+  fields.gravity << cr * pitched.x() - sr * pitched.y(), sr * pitched.x() + cr * pitched.y(), pitched.z();
 }
 
 }  // namespace supine::simulation

@@ -15,11 +15,8 @@ namespace {
 
 Eigen::VectorXd all_numbers(const Fields<double>& f) {
   std::vector<double> numbers;
-  for (const auto* column : {&f.ln_young, &f.poisson, &f.stiffening, &f.skin_modulus, &f.skin_prestretch,
-                             &f.interface_normal, &f.interface_tangential, &f.cut_stiffness})
-    numbers.insert(numbers.end(), column->begin(), column->end());
-  for (int i = 0; i < 3; ++i) numbers.push_back(f.gravity[i]);
-  numbers.push_back(f.density);
+  for (const auto& entry : field_columns<double>)
+    numbers.insert(numbers.end(), (f.*entry.column).begin(), (f.*entry.column).end());
   return Eigen::Map<Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
 }
 
@@ -65,23 +62,7 @@ TEST_P(CatalogueTest, EveryParameterHasTheDerivativeItStates) {
       }
       return with(values);
     };
-    const auto moving = at(Dual(0.0, 0));
-    Fields<double> slope = values_of(moving);  // same shapes; overwritten by the derivatives
-    const auto derivative = [](const Fields<Dual>::Column& from, Eigen::VectorXd& to) {
-      for (Eigen::Index i = 0; i < from.size(); ++i) to[i] = from[i].v[0];
-    };
-    derivative(moving.ln_young, slope.ln_young);
-    derivative(moving.poisson, slope.poisson);
-    derivative(moving.stiffening, slope.stiffening);
-    derivative(moving.skin_modulus, slope.skin_modulus);
-    derivative(moving.skin_prestretch, slope.skin_prestretch);
-    derivative(moving.interface_normal, slope.interface_normal);
-    derivative(moving.interface_tangential, slope.interface_tangential);
-    derivative(moving.cut_stiffness, slope.cut_stiffness);
-    for (int i = 0; i < 3; ++i) slope.gravity[i] = moving.gravity[i].v[0];
-    slope.density = moving.density.v[0];
-
-    const Eigen::VectorXd tangent = all_numbers(slope);
+    const Eigen::VectorXd tangent = all_numbers(derivatives_of(at(Dual(0.0, 0))));
     ASSERT_GT(tangent.norm(), 1e-9) << rows[p].name << " changes nothing";
     const double h = 1e-5;
     const Eigen::VectorXd difference =

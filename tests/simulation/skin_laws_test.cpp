@@ -12,9 +12,7 @@ using testing::taylor_order;
 
 PlaneInvariants<double> of_stretches(double l1, double l2) { return {l1 * l1 + l2 * l2, l1 * l1 * l2 * l2}; }
 
-SkinSettings settings(SkinLaw law, Compression compression, double share = 0.05) {
-  return {law, compression, share, 0.45};
-}
+SkinMaterial<double> material(double share = 0.05) { return {1, 0.45, share, 1}; }
 
 class SkinLawTest : public ::testing::TestWithParam<SkinLaw> {};
 
@@ -25,11 +23,11 @@ TEST_P(SkinLawTest, DerivativesFollowTheEnergyInEveryRegime) {
   for (const Compression compression : {Compression::tension_field, Compression::full})
     for (const auto& [l1, l2] : places) {
       const auto c = of_stretches(l1, l2);
-      const auto s = settings(GetParam(), compression);
-      const auto e = skin_energy<double>(s, c);
+      const SkinSettings s{GetParam(), compression};
+      const auto e = skin_energy<double>(s, material(), c);
       EXPECT_GT(taylor_order(
                     [&](double h) {
-                      return skin_energy<double>(s, {c.a + h, c.b - 0.7 * h}).psi;
+                      return skin_energy<double>(s, material(), {c.a + h, c.b - 0.7 * h}).psi;
                     },
                     e.psi_a - 0.7 * e.psi_b),
                 1.9)
@@ -38,12 +36,12 @@ TEST_P(SkinLawTest, DerivativesFollowTheEnergyInEveryRegime) {
 }
 
 TEST_P(SkinLawTest, RelaxedEnergyAndStressAreContinuousAcrossTheBorders) {
-  const auto s = settings(GetParam(), Compression::tension_field, 0.0);
+  const SkinSettings s{GetParam(), Compression::tension_field};
   const double natural = GetParam() == SkinLaw::neo_hookean ? 1 / std::sqrt(1.3) : 1 - 0.45 * 0.3;
   for (const auto& [l1, l2] : std::vector<std::pair<double, double>>{{1.3, natural}, {1.0, 0.8}}) {
     const bool along_first = l1 == 1.0;
     const auto at = [&](double d) {
-      return skin_energy<double>(s, along_first ? of_stretches(l1 + d, l2) : of_stretches(l1, l2 + d));
+      return skin_energy<double>(s, material(0), along_first ? of_stretches(l1 + d, l2) : of_stretches(l1, l2 + d));
     };
     const auto below = at(-1e-7), above = at(1e-7);
     EXPECT_NEAR(below.psi, above.psi, 1e-6);
@@ -56,8 +54,9 @@ TEST_P(SkinLawTest, RelaxedNeverExceedsFullAndAgreesWhereTaut) {
   for (double l1 = 0.6; l1 < 1.6; l1 += 0.07)
     for (double l2 = 0.5; l2 <= l1; l2 += 0.07) {
       const auto c = of_stretches(l1, l2);
-      const double full = skin_energy<double>(settings(GetParam(), Compression::full), c).psi;
-      const double relaxed = skin_energy<double>(settings(GetParam(), Compression::tension_field, 0), c).psi;
+      const double full = skin_energy<double>(SkinSettings{GetParam(), Compression::full}, material(), c).psi;
+      const double relaxed =
+          skin_energy<double>(SkinSettings{GetParam(), Compression::tension_field}, material(0), c).psi;
       EXPECT_LE(relaxed, full + 1e-12);
       EXPECT_GE(relaxed, 0);
       if (l2 >= 1) {
@@ -68,9 +67,9 @@ TEST_P(SkinLawTest, RelaxedNeverExceedsFullAndAgreesWhereTaut) {
 
 TEST_P(SkinLawTest, UniaxialTensionGivesYoungsModulus) {
   // A free narrow strip: stress along it over strain is E, because the second stretch takes its natural width.
-  const auto s = settings(GetParam(), Compression::tension_field, 0.0);
+  const SkinSettings s{GetParam(), Compression::tension_field};
   const double strain = 1e-4;
-  const double energy = skin_energy<double>(s, of_stretches(1 + strain, 0.9)).psi;
+  const double energy = skin_energy<double>(s, material(0), of_stretches(1 + strain, 0.9)).psi;
   EXPECT_NEAR(energy, 0.5 * strain * strain, 2e-3 * 0.5 * strain * strain);
 }
 
