@@ -8,6 +8,7 @@
 
 #include "common/error.h"
 #include "pipeline/toml_reader.h"
+#include "simulation/bulk_laws.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
@@ -80,11 +81,9 @@ void read_choice(const std::optional<TomlReader>& section, std::string_view key,
 void read_choices(const TomlReader& file, Model& model) {
   using namespace simulation;
   const auto breast = file.sub_table("breast"), skin = file.sub_table("skin");
-  read_choice<BulkLaw>(breast, "law",
-                       {{"neo_hookean", BulkLaw::neo_hookean},
-                        {"corotational", BulkLaw::corotational},
-                        {"corotational_qr", BulkLaw::corotational_qr}},
-                       model.breast.law);
+  read_choice<BulkLaw>(breast, "law", bulk_law_names(), model.breast.law);
+  read_choice<Volumetric>(breast, "volumetric", {{"mean", Volumetric::mean}, {"pointwise", Volumetric::pointwise}},
+                          model.breast.volumetric);
   read_choice<DensityReference>(breast, "density_refers_to",
                                 {{"imaged", DensityReference::imaged}, {"undeformed", DensityReference::undeformed}},
                                 model.breast.density_refers_to);
@@ -107,7 +106,7 @@ std::pair<std::string, std::string> split_name(const std::string& name) {
 }
 
 void check_base_keys(const TomlReader& file) {
-  std::map<std::string, std::vector<std::string>> known = {{"breast", {"law", "density_refers_to"}},
+  std::map<std::string, std::vector<std::string>> known = {{"breast", {"law", "density_refers_to", "volumetric"}},
                                                            {"skin", {"law", "compression"}},
                                                            {"interface", {"kind"}},
                                                            {"cut", {"kind"}}};
@@ -122,16 +121,15 @@ void check_base_keys(const TomlReader& file) {
 void read_base(const TomlReader& file, Model& model) {
   check_base_keys(file);
   read_choices(file, model);
-  const auto skin = file.sub_table("skin");
-  const bool incompressible_skin = model.skin.law == simulation::SkinLaw::neo_hookean;
-  if (incompressible_skin && skin && skin->has("poisson_ratio"))
-    skin->fail("poisson_ratio",
-               "the neo_hookean skin is incompressible and has none; leave it out or use law = \"corotational\"");
   for (const Parameter& row : simulation::base_parameters()) {
-    if (row.name == "skin.poisson_ratio" && incompressible_skin) continue;
     const auto [section, key] = split_name(row.name);
+    const auto table = file.sub_table(section);
+    if (const std::string reason = simulation::why_not_of(model, row.name); !reason.empty()) {
+      if (table && table->has(key)) table->fail(key, reason);
+      continue;
+    }
     Setting& setting = base_setting(model, row.name);
-    if (const auto table = file.sub_table(section))
+    if (table)
       read_setting(*table, key, row, setting);
     else
       setting.lower = row.lower, setting.upper = row.upper;

@@ -42,6 +42,45 @@ int Pattern::block(int a, int b) const {
   return 9 * first_[b] + 3 * rank;
 }
 
+namespace {
+
+constexpr std::size_t cluster_size = 32;
+
+/// Elements at each node, concatenated: those of node n are at first[n] to first[n + 1].
+struct Incidence {
+  std::vector<int> first, element;
+  Incidence(const Indices& nodes, Eigen::Index mesh_nodes) : first(mesh_nodes + 1, 0), element(nodes.size()) {
+    for (const int node : nodes.reshaped()) ++first[node + 1];
+    for (Eigen::Index n = 0; n < mesh_nodes; ++n) first[n + 1] += first[n];
+    std::vector<int> next(first.begin(), first.end() - 1);
+    for (Eigen::Index e = 0; e < nodes.rows(); ++e)
+      for (const int node : nodes.row(e)) element[next[node]++] = static_cast<int>(e);
+  }
+};
+
+/// Compact clusters, each grown from the first element that is left over its neighbours.
+std::vector<Elements::Cluster> clusters_of_neighbours(const Indices& nodes, Eigen::Index mesh_nodes) {
+  const Incidence at(nodes, mesh_nodes);
+  std::vector<char> seen(nodes.rows(), 0);
+  std::vector<Elements::Cluster> clusters;
+  for (int start = 0; start < nodes.rows(); ++start) {
+    if (seen[start]) continue;
+    Elements::Cluster cluster = {start};
+    seen[start] = 1;
+    for (std::size_t grown = 0; grown < cluster.size(); ++grown)
+      for (const int node : nodes.row(cluster[grown]))
+        for (int i = at.first[node]; i < at.first[node + 1] && cluster.size() < cluster_size; ++i)
+          if (!seen[at.element[i]]) {
+            seen[at.element[i]] = 1;
+            cluster.push_back(at.element[i]);
+          }
+    clusters.push_back(std::move(cluster));
+  }
+  return clusters;
+}
+
+}  // namespace
+
 Elements::Elements(Indices nodes, const Pattern& pattern) : nodes_(std::move(nodes)) {
   const Eigen::Index n = nodes_.cols();
   blocks_.reserve(count() * n * n);
@@ -52,23 +91,28 @@ Elements::Elements(Indices nodes, const Pattern& pattern) : nodes_(std::move(nod
       for (Eigen::Index b = 0; b < n; ++b) blocks_.push_back(pattern.block(nodes_(e, a), nodes_(e, b)));
     }
 
-  // Greedy colouring: the lowest colour no element at any of the nodes has taken. 64 colours per word.
-  std::vector<std::vector<std::uint64_t>> taken(pattern.dofs() / 3, std::vector<std::uint64_t>(1, 0));
-  for (int e = 0; e < count(); ++e) {
-    std::size_t word = 0;
+  colour_clusters(clusters_of_neighbours(nodes_, pattern.dofs() / 3), pattern.dofs() / 3);
+}
+
+void Elements::colour_clusters(std::vector<Cluster> clusters, Eigen::Index mesh_nodes) {
+  // Greedy: the lowest colour that no cluster at any of the nodes has taken. 64 colours per word.
+  std::vector<std::vector<std::uint64_t>> taken(mesh_nodes, std::vector<std::uint64_t>(1, 0));
+  for (Cluster& cluster : clusters) {
     int colour = -1;
-    for (; colour < 0; ++word) {
+    for (std::size_t word = 0; colour < 0; ++word) {
       std::uint64_t used = 0;
-      for (Eigen::Index a = 0; a < n; ++a) {
-        auto& words = taken[nodes_(e, a)];
-        if (words.size() <= word) words.resize(word + 1, 0);
-        used |= words[word];
-      }
+      for (const int e : cluster)
+        for (const int node : nodes_.row(e)) {
+          auto& words = taken[node];
+          if (words.size() <= word) words.resize(word + 1, 0);
+          used |= words[word];
+        }
       if (~used != 0) colour = static_cast<int>(64 * word) + __builtin_ctzll(~used);
     }
-    for (Eigen::Index a = 0; a < n; ++a) taken[nodes_(e, a)][colour / 64] |= std::uint64_t{1} << (colour % 64);
+    for (const int e : cluster)
+      for (const int node : nodes_.row(e)) taken[node][colour / 64] |= std::uint64_t{1} << (colour % 64);
     if (static_cast<int>(colours_.size()) <= colour) colours_.resize(colour + 1);
-    colours_[colour].push_back(e);
+    colours_[colour].push_back(std::move(cluster));
   }
 }
 

@@ -30,15 +30,17 @@ class Pattern {
   std::vector<int> neighbour_;  // sorted within each node
 };
 
-/// Elements of one kind: nodes, value positions, and colours within which no two elements share a node, so that
-/// they may add to the sums at the same time and every sum has one order whatever the number of threads.
+/// Elements of one kind: nodes, value positions, and clusters of neighbouring elements in colours. No two clusters of a
+/// colour share a node, so that they may add to the sums at the same time, each in its own order: every sum has one
+/// order whatever the number of threads, and there are few colours to wait for.
 class Elements {
  public:
   Elements(Indices nodes, const Pattern& pattern);
 
   const Indices& nodes() const { return nodes_; }
   Eigen::Index count() const { return nodes_.rows(); }
-  const std::vector<std::vector<int>>& colours() const { return colours_; }
+  using Cluster = std::vector<int>;
+  const std::vector<std::vector<Cluster>>& colours() const { return colours_; }
   /// Positions of the n × n node blocks of element @p e, row-major over (a, b).
   const int* blocks(int e) const {
     return blocks_.data() + static_cast<std::size_t>(e) * nodes_.cols() * nodes_.cols();
@@ -47,9 +49,11 @@ class Elements {
   const int* strides(int e) const { return strides_.data() + static_cast<std::size_t>(e) * nodes_.cols(); }
 
  private:
+  void colour_clusters(std::vector<Cluster> clusters, Eigen::Index mesh_nodes);
+
   Indices nodes_;
   std::vector<int> blocks_, strides_;
-  std::vector<std::vector<int>> colours_;
+  std::vector<std::vector<Cluster>> colours_;
 };
 
 /// What a pass over the elements is to compute.
@@ -100,25 +104,26 @@ void add_elements(const Elements& elements, const Demand& demand, Sums& sums, co
           for (int i = 0; i < 3; ++i) column[i] += local(3 * a + i, 3 * b + k);
         }
   };
+  const auto add_element = [&](int e) {
+    Local<n> local;
+    local.residual.setZero();
+    if (demand.tangent || demand.reference_tangent) local.tangent.setZero();
+    if (demand.reference_tangent) local.reference_tangent.setZero();
+    kernel(e, local);
+    sums.element_energy[e] = local.energy;
+    sums.element_det_f[e] = local.min_det_f;
+    if (demand.residual)
+      for (int a = 0; a < n; ++a)
+        sums.residual.template segment<3>(3 * elements.nodes()(e, a)) += local.residual.template segment<3>(3 * a);
+    if (demand.tangent) scatter(local.tangent, elements.blocks(e), elements.strides(e), sums.tangent.valuePtr());
+    if (demand.reference_tangent)
+      scatter(local.reference_tangent, elements.blocks(e), elements.strides(e), sums.reference_tangent.valuePtr());
+  };
   for (const auto& colour : elements.colours()) {
-    const int size = static_cast<int>(colour.size());
-#pragma omp parallel for schedule(static) if (size > 32)
-    for (int s = 0; s < size; ++s) {
-      const int e = colour[s];
-      Local<n> local;
-      local.residual.setZero();
-      if (demand.tangent || demand.reference_tangent) local.tangent.setZero();
-      if (demand.reference_tangent) local.reference_tangent.setZero();
-      kernel(e, local);
-      sums.element_energy[e] = local.energy;
-      sums.element_det_f[e] = local.min_det_f;
-      if (demand.residual)
-        for (int a = 0; a < n; ++a)
-          sums.residual.template segment<3>(3 * elements.nodes()(e, a)) += local.residual.template segment<3>(3 * a);
-      if (demand.tangent) scatter(local.tangent, elements.blocks(e), elements.strides(e), sums.tangent.valuePtr());
-      if (demand.reference_tangent)
-        scatter(local.reference_tangent, elements.blocks(e), elements.strides(e), sums.reference_tangent.valuePtr());
-    }
+    const int clusters = static_cast<int>(colour.size());
+#pragma omp parallel for schedule(static) if (clusters > 1)
+    for (int c = 0; c < clusters; ++c)
+      for (const int e : colour[c]) add_element(e);
   }
   for (int e = 0; e < elements.count(); ++e) {
     sums.energy += sums.element_energy[e];

@@ -1,114 +1,170 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/bulk.h"
 
+#include <fmt/format.h>
+
 #include "common/error.h"
+#include "simulation/laws/invariant_kernel.h"
 #include "simulation/tet_geometry.h"
 
 namespace supine::simulation {
 namespace {
 
 template <int N>
-Eigen::Matrix<double, 3, 2> rest_edges(const NodeRows<N>& nodes) {
-  Eigen::Matrix<double, 3, 2> edges;
+Edges rest_edges(const NodeRows<N>& nodes) {
+  Edges edges;
   edges.col(0) = nodes.row(1) - nodes.row(0);
   edges.col(1) = nodes.row(2) - nodes.row(0);
   return edges;
 }
 
-// K_{ai,bk} += V A_{iJkL} B_aJ B_bL.
+/// ∂(rest edge c)/∂X_b, a multiple of the identity.
 template <int N>
-void add_tangent(const Tangent9& a, const Eigen::Matrix<double, N, 3>& b, double volume,
-                 Eigen::Matrix<double, 3 * N, 3 * N>& tangent) {
-  for (int n = 0; n < N; ++n) {
-    Eigen::Matrix<double, 9, 3> t;  // A_{iJkL} B_nL at row 3i+J, column k
-    for (int k = 0; k < 3; ++k) t.col(k).noalias() = a.template middleCols<3>(3 * k) * b.row(n).transpose();
-    for (int m = 0; m < N; ++m)
-      for (int i = 0; i < 3; ++i)
-        tangent.template block<1, 3>(3 * m + i, 3 * n).noalias() +=
-            volume * (b.row(m) * t.template middleRows<3>(3 * i));
-  }
+Eigen::Matrix<double, N, 2> edge_ends() {
+  Eigen::Matrix<double, N, 2> ends = Eigen::Matrix<double, N, 2>::Zero();
+  ends.row(0).setConstant(-1);
+  ends(1, 0) = ends(2, 1) = 1;
+  return ends;
 }
 
-// L_{ai,bK} += -K_{ai,bm} F_mK + V (B_bK (P B_a)_i - (P B_b)_i B_aK), K being this point's share.
-template <int N>
-void add_reference_tangent(const Eigen::Matrix<double, 3 * N, 3 * N>& point_tangent, const Matrix3& f,
-                           const Eigen::Matrix<double, N, 3>& force, const Eigen::Matrix<double, N, 3>& b,
-                           Eigen::Matrix<double, 3 * N, 3 * N>& out) {
-  for (int n = 0; n < N; ++n) {
-    out.template middleCols<3>(3 * n).noalias() -= point_tangent.template middleCols<3>(3 * n) * f;
-    for (int m = 0; m < N; ++m)
-      out.template block<3, 3>(3 * m, 3 * n) +=
-          force.row(m).transpose() * b.row(n) - force.row(n).transpose() * b.row(m);
-  }
-}
+/// A quadrature point with its deformation.
+template <class Element>
+struct CellPoint {
+  TetPoint<Element> rest;
+  Matrix3 f;
+  double det_f;
+};
 
-// Dependence of the QR rotation on the undeformed edges at fixed F.
+/// Mean dilation of a cell, θ̄ = Σ V θ / Σ V, while its points are summed.
 template <int N>
-void add_qr_reference_tangent(const Eigen::Matrix<double, 9, 6>& d, const Eigen::Matrix<double, N, 3>& b, double volume,
-                              Eigen::Matrix<double, 3 * N, 3 * N>& out) {
-  for (int m = 0; m < N; ++m)
-    for (int i = 0; i < 3; ++i) {
-      const Eigen::Matrix<double, 1, 6> row = volume * b.row(m) * d.template middleRows<3>(3 * i);
-      out.template block<1, 3>(3 * m + i, 3) += row.template head<3>();
-      out.template block<1, 3>(3 * m + i, 6) += row.template tail<3>();
-      out.template block<1, 3>(3 * m + i, 0) -= row.template head<3>() + row.template tail<3>();
-    }
-}
+struct MeanDilation {
+  double volume = 0, sum = 0;        // Σ V, Σ V θ
+  Nodal<N> by_x = Nodal<N>::Zero();  // Σ V ∂θ/∂x
+  Nodal<N> by_X = Nodal<N>::Zero();  // Σ V ∂θ/∂X + Σ (θ - θ̄) ∂V/∂X, with θ̄ known
+  double mean() const { return sum / volume; }
+
+  void add(double theta, double weight) {
+    volume += weight;
+    sum += weight * theta;
+  }
+  /// @param slope  ∂θ/∂F B_a of a point whose F is @p f
+  void add_slope(double theta, const Nodal<N>& slope, const Nodal<N>& b, const Matrix3& f, double weight) {
+    by_x += weight * slope;
+    by_X += weight * ((theta - mean()) * b - slope * f);
+  }
+  /// The part of the matrices in which θ̄ varies; the rest goes through the pressure at the points.
+  void add_to(double excess, const Demand& demand, ElementSums<N>& sums) const {
+    const double scale = excess / volume;
+    if (demand.tangent) sums.add_outer(by_x, by_x, scale, true);
+    if (demand.reference_tangent) sums.add_reference_outer(by_x, by_X, scale);
+  }
+};
 
 }  // namespace
 
+template <class T>
+SplitLambda<T> split_lambda(const BulkMaterial<T>& m) {
+  using std::exp;
+  const T knee = pointwise_lambda_over_mu * m.mu_kpa;
+  if (!(m.lambda_kpa > knee)) return {m.lambda_kpa, T(0.0)};
+  const T over = m.lambda_kpa - knee, pointwise = knee * (2.0 - exp(-over / knee));
+  return {pointwise, m.lambda_kpa - pointwise};
+}
+
 template <class Element>
-BulkTerm<Element>::BulkTerm(const Indices& cells, const Pattern& pattern, BulkLaw law)
-    : elements_(cells, pattern), law_(law) {
-  if (law == BulkLaw::corotational_qr && Element::nodes != 4)
+BulkTerm<Element>::BulkTerm(const Indices& cells, const Pattern& pattern, const BulkSettings& settings)
+    : elements_(cells, pattern), settings_(settings) {
+  if (settings.law == BulkLaw::corotational_qr && Element::nodes != 4)
     throw InputError(
         "breast.law = corotational_qr needs linear tetrahedra: make the mesh with --order 1, or use corotational");
 }
 
 template <class Element>
+template <class T>
+auto BulkTerm<Element>::cell_material(const Fields<T>& fields, Eigen::Index cell) const -> CellMaterial<T> {
+  using std::exp;
+  CellMaterial<T> material{bulk_material<T>(exp(fields.ln_young[cell]), fields.poisson[cell], fields.stiffening[cell]),
+                           T(0.0)};
+  material.point.shape = {fields.law_shape_1[cell], fields.law_shape_2[cell]};
+  if (Element::points > 1 && settings_.volumetric == Volumetric::mean) {
+    const auto split = split_lambda(material.point);
+    material.point.lambda_kpa = split.pointwise;
+    material.excess = split.excess;
+  }
+  return material;
+}
+
+template <class Element>
 void BulkTerm<Element>::set_fields(const Fields<double>& fields) {
   material_.resize(elements_.count());
-  for (Eigen::Index c = 0; c < elements_.count(); ++c)
-    material_[c] = bulk_material(std::exp(fields.ln_young[c]), fields.poisson[c], fields.stiffening[c]);
+  for (Eigen::Index c = 0; c < elements_.count(); ++c) {
+    material_[c] = cell_material(fields, c);
+    const auto& m = material_[c].point;
+    if (settings_.law == BulkLaw::mooney_rivlin && m.lambda_kpa < 2 * m.shape[0] * m.mu_kpa)
+      throw InputError(fmt::format(
+          "breast.mooney_share = {:.3g} is too much for the Poisson's ratio {:.3g} of cell {}: it must be at most "
+          "ν/(1 - 2ν) = {:.3g}; raise breast.poisson_ratio or lower the share",
+          m.shape[0], fields.poisson[c], c, 0.5 * m.lambda_kpa / m.mu_kpa));
+  }
 }
 
 template <class Element>
 void BulkTerm<Element>::add_cell(int e, const State& state, const Demand& demand, Local<Element::nodes>& local) const {
   constexpr int n = Element::nodes;
   const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
+  const BulkLaw law = settings_.law;
+  const auto& [material, excess] = material_[e];
+  std::array<CellPoint<Element>, Element::points> points;
+  MeanDilation<n> mean;
   for (int p = 0; p < Element::points; ++p) {
-    const auto point = tet_point<Element>(rest, p);
-    const Matrix3 f = point.det > 0 ? Matrix3(x.transpose() * point.b) : Matrix3::Zero();
-    const double det_f = point.det > 0 ? f.determinant() : point.det;
+    auto& [place, f, det_f] = points[p];
+    place = tet_point<Element>(rest, p);
+    det_f = place.det;
+    if (place.det > 0) {
+      f.noalias() = x.transpose() * place.b;
+      det_f = f.determinant();
+    }
     local.min_det_f = std::min(local.min_det_f, det_f);
     if (!(det_f > 0)) return;
-    const auto& material = material_[e];
-    if (demand.energy && has_energy()) local.energy += point.volume * bulk_energy(law_, f, material);
-    if (!demand.residual && !demand.tangent && !demand.reference_tangent) continue;
-
-    Matrix3 stress;
-    Tangent9 a;
-    const auto edges = rest_edges<n>(rest);
-    if (demand.tangent || demand.reference_tangent)
-      bulk_tangent(law_, f, material, edges, stress, a);
-    else
-      stress = bulk_stress<double>(law_, f, material, edges);
-    const Eigen::Matrix<double, n, 3> force = point.volume * point.b * stress.transpose();
-    for (int m = 0; m < n; ++m) local.residual.template segment<3>(3 * m) += force.row(m).transpose();
-    if (!demand.tangent && !demand.reference_tangent) continue;
-
-    if (!demand.reference_tangent) {
-      add_tangent<n>(a, point.b, point.volume, local.tangent);
-      continue;
-    }
-    Eigen::Matrix<double, 3 * n, 3 * n> point_tangent = Eigen::Matrix<double, 3 * n, 3 * n>::Zero();
-    add_tangent<n>(a, point.b, point.volume, point_tangent);
-    add_reference_tangent<n>(point_tangent, f, force, point.b, local.reference_tangent);
-    local.tangent += point_tangent;
-    if (law_ == BulkLaw::corotational_qr)
-      add_qr_reference_tangent<n>(qr_rest_derivative(f, material, edges), point.b, point.volume,
-                                  local.reference_tangent);
+    if (excess > 0)
+      mean.add(is_invariant_law(law) ? dilation(law, InvariantStrain(f, det_f)).value : PolarPoint(f).dilation,
+               place.volume);
   }
+  const double pressure = excess > 0 ? excess * mean.mean() : 0;
+  if (excess > 0 && demand.energy) local.energy += 0.5 * pressure * mean.sum;
+
+  const bool matrices = demand.tangent || demand.reference_tangent;
+  ElementSums<n> sums;
+  sums.clear(demand);
+  for (const auto& [place, f, det_f] : points) {
+    if (is_invariant_law(law)) {
+      const InvariantStrain strain(f, det_f);
+      const double margin = law_margin(law, strain, material);
+      local.min_det_f = std::min(local.min_det_f, margin > 0 ? local.min_det_f : margin);
+      if (!(margin > 0)) return;
+      auto response = invariant_response(law, strain, material);
+      if (demand.energy) local.energy += place.volume * response.energy;
+      if (excess > 0) {
+        const auto theta = dilation(law, strain);
+        response.wl += pressure * theta.first;
+        response.wll += pressure * theta.second;
+        if (matrices)
+          mean.add_slope(theta.value, theta.first * (place.b * strain.g.transpose()), place.b, f, place.volume);
+      }
+      if (demand.residual || matrices) add_invariant_point<n>(strain, response, place.b, place.volume, demand, sums);
+    } else if (law == BulkLaw::corotational) {
+      const PolarPoint point(f);
+      if (demand.energy) local.energy += place.volume * point.energy(material);
+      if (excess > 0 && matrices)
+        mean.add_slope(point.dilation, place.b * point.r.transpose(), place.b, f, place.volume);
+      if (demand.residual || matrices)
+        add_polar_point<n>(point, material, pressure, place.b, place.volume, demand, sums);
+    } else {
+      add_qr_point<n>(f, rest_edges<n>(rest), material, place.b, place.volume, edge_ends<n>(), demand, sums);
+    }
+  }
+  if (excess > 0 && matrices) mean.add_to(excess, demand, sums);
+  if (demand.residual || matrices) sums.write(demand, law != BulkLaw::corotational_qr, local);
 }
 
 template <class Element>
@@ -118,26 +174,41 @@ void BulkTerm<Element>::add(const State& state, const Demand& demand, Sums& sums
 }
 
 template <class Element>
-void BulkTerm<Element>::add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const {
+void BulkTerm<Element>::add_cell_derivative(int e, const State& state, const CellMaterial<Dual>& material,
+                                            Local<Element::nodes>& local) const {
   constexpr int n = Element::nodes;
-  const Demand demand{.residual = true};
-  add_elements<n>(elements_, demand, sums, [this, &state, &fields](int e, auto& local) {
-    const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
-    const auto material = bulk_material<Dual>(ceres::exp(fields.ln_young[e]), fields.poisson[e], fields.stiffening[e]);
-    for (int p = 0; p < Element::points; ++p) {
-      const auto point = tet_point<Element>(rest, p);
-      if (!(point.det > 0)) return;
-      const Matrix3 f = x.transpose() * point.b;
-      const auto stress = bulk_stress<Dual>(law_, f, material, rest_edges<n>(rest));
-      Matrix3 derivative;
-      for (int i = 0; i < 9; ++i) derivative(i / 3, i % 3) = stress(i / 3, i % 3).v[0];
-      const Eigen::Matrix<double, n, 3> force = point.volume * point.b * derivative.transpose();
-      for (int m = 0; m < n; ++m) local.residual.template segment<3>(3 * m) += force.row(m).transpose();
-    }
+  const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
+  const BulkLaw law = settings_.law;
+  std::array<CellPoint<Element>, Element::points> points;
+  MeanDilation<n> mean;
+  for (int p = 0; p < Element::points; ++p) {
+    auto& [place, f, det_f] = points[p];
+    place = tet_point<Element>(rest, p);
+    if (!(place.det > 0)) return;
+    f = x.transpose() * place.b;
+    if (material.excess != Dual(0.0))
+      mean.add(is_invariant_law(law) ? dilation(law, InvariantStrain(f)).value : PolarPoint(f).dilation, place.volume);
+  }
+  const Dual pressure = material.excess != Dual(0.0) ? Dual(material.excess * mean.mean()) : Dual(0.0);
+  for (const auto& [place, f, det_f] : points) {
+    const auto stress = bulk_stress<Dual>(law, f, material.point, rest_edges<n>(rest), pressure);
+    Matrix3 derivative;
+    for (int i = 0; i < 9; ++i) derivative.data()[i] = stress.data()[i].v[0];
+    const Nodal<n> force = place.volume * place.b * derivative.transpose();
+    for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += force.row(a).transpose();
+  }
+}
+
+template <class Element>
+void BulkTerm<Element>::add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const {
+  add_elements<Element::nodes>(elements_, Demand{.residual = true}, sums, [this, &state, &fields](int e, auto& local) {
+    add_cell_derivative(e, state, cell_material(fields, e), local);
   });
 }
 
 template class BulkTerm<Tet4>;
 template class BulkTerm<Tet10>;
+template SplitLambda<double> split_lambda(const BulkMaterial<double>&);
+template SplitLambda<Dual> split_lambda(const BulkMaterial<Dual>&);
 
 }  // namespace supine::simulation

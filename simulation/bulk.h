@@ -9,26 +9,55 @@
 
 namespace supine::simulation {
 
-/// Elasticity of the tissue: r_ai = ∫ P_iJ ∂N_a/∂X_J dV over the undeformed volume.
-/// ∂r/∂X follows from ∂B_aJ/∂X_bK = -B_aK B_bJ and ∂V/∂X_bK = V B_bK (B = ∂N/∂X); see docs/mechanics.md.
+struct BulkSettings {
+  BulkLaw law = BulkLaw::neo_hookean;
+  Volumetric volumetric = Volumetric::mean;
+};
+
+/// λ up to which every quadrature point of a cell resists a change of its own volume, as a multiple of μ: ν = 0.45.
+inline constexpr double pointwise_lambda_over_mu = 9.0;
+
+/// λ split into a part that acts at every quadrature point and the excess that acts on the cell's mean dilation:
+/// λ = pointwise + excess, excess = 0 up to pointwise_lambda_over_mu and smooth (C1) beyond.
+template <class T>
+struct SplitLambda {
+  T pointwise, excess;
+};
+template <class T>
+SplitLambda<T> split_lambda(const BulkMaterial<T>& m);
+
+/// Elasticity of the tissue: r_ai = ∫ P_iJ ∂N_a/∂X_J dV over the undeformed volume, plus, where nearly incompressible
+/// quadratic cells would lock, V/2 excess θ̄² with θ̄ the mean over the cell of θ = ln J (J - 1 for
+/// neo_hookean_calculix, tr U - 3 for corotational). ∂r/∂X is exact; see docs/mechanics.md.
 /// @tparam Element  Tet4 or Tet10
 template <class Element>
 class BulkTerm : public Term {
  public:
   /// @throws InputError  corotational_qr on quadratic cells: the study defines it for linear ones
-  BulkTerm(const Indices& cells, const Pattern& pattern, BulkLaw law);
+  BulkTerm(const Indices& cells, const Pattern& pattern, const BulkSettings& settings);
 
+  /// @throws InputError  mooney_rivlin with λ < 4 C01 in a cell: its volumetric energy would not be convex
   void set_fields(const Fields<double>& fields) override;
+  /// A state that a law has no energy for (gent beyond its limit) is reported like an inverted cell, min_det_f <= 0.
   void add(const State& state, const Demand& demand, Sums& sums) const override;
   void add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const override;
-  bool has_energy() const override { return law_ != BulkLaw::corotational_qr; }
+  bool has_energy() const override { return settings_.law != BulkLaw::corotational_qr; }
 
  private:
+  template <class T>
+  struct CellMaterial {
+    BulkMaterial<T> point;  // λ is the pointwise part
+    T excess;
+  };
+  template <class T>
+  CellMaterial<T> cell_material(const Fields<T>& fields, Eigen::Index cell) const;
   void add_cell(int e, const State& state, const Demand& demand, Local<Element::nodes>& local) const;
+  void add_cell_derivative(int e, const State& state, const CellMaterial<Dual>& material,
+                           Local<Element::nodes>& local) const;
 
   Elements elements_;
-  BulkLaw law_;
-  std::vector<BulkMaterial<double>> material_;  // per cell
+  BulkSettings settings_;
+  std::vector<CellMaterial<double>> material_;  // per cell
 };
 
 extern template class BulkTerm<Tet4>;

@@ -50,6 +50,8 @@ class Effect {
   virtual std::string meaning() const = 0;
   virtual const std::vector<Parameter>& parameters() const = 0;
   virtual const std::vector<OptionRow>& options() const;
+  /// Whether it acts in prone or in the other poses only, so that with prone alone it means nothing.
+  virtual bool needs_other_pose() const { return false; }
   /// @param values   one per row of parameters()
   /// @param options  every option of options(), by name
   virtual void apply(const Scene& scene, std::span<const Dual> values,

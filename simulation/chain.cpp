@@ -36,86 +36,96 @@ double checked_min_det_f(const meshing::TetMesh& mesh, const Points& x, const Po
                   what, cell, centre.x(), centre.y(), centre.z(), least));
 }
 
-/// Loads and solves on one mesh and one model; owns what is reused between poses.
-class Chain {
- public:
-  Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model, const SolveOptions& options)
-      : model_(model), mechanics_(mesh, anatomy, model), solver_(mechanics_, options) {}
-
-  void check_effects(const std::string& pose) const {
-    check_effects_act(model_, Scene{mechanics_.mesh(), mechanics_.anatomy(), mechanics_.layout(), pose});
-  }
-
-  void load(const std::string& pose, const Eigen::Vector3d& gravity) {
-    const Scene scene{mechanics_.mesh(), mechanics_.anatomy(), mechanics_.layout(), pose};
-    mechanics_.set_fields(values_of(make_fields(model_, scene, gravity)));
-  }
-
-  SolveReport undeformed(const PoseLoad& prone, InverseMethod method, Points& X) {
-    const Points& imaged = mechanics_.mesh().points;
-    if (method == InverseMethod::newton) {
-      load(prone.name, prone.gravity);
-      return solver_.inverse(imaged, X, "prone → undeformed");
-    }
-    load(prone.name, -prone.gravity);
-    SolveReport report = solver_.forward(imaged, X, "prone → undeformed (reversed gravity)");
-    return method == InverseMethod::reversed_gravity ? report : corrected(prone, report, X);
-  }
-
-  PoseSolution pose(const PoseLoad& pose, const Points& X) {
-    load(pose.name, pose.gravity);
-    PoseSolution solution{pose.name, {}, {}};
-    solution.report = solver_.forward(X, solution.x, "undeformed → " + pose.name);
-    return solution;
-  }
-
- private:
-  SolveReport corrected(const PoseLoad& prone, SolveReport report, Points& X) {
-    const Points& imaged = mechanics_.mesh().points;
-    load(prone.name, prone.gravity);
-    double error = 0;
-    for (int correction = 0; correction < max_corrections; ++correction) {
-      Points x;
-      const SolveReport forward = solver_.forward(X, x, "prone → undeformed (fixed point)");
-      report.newton_iterations += forward.newton_iterations;
-      report.factorisations += forward.factorisations;
-      report.load_steps = forward.load_steps;
-      report.residual_share = forward.residual_share;
-      error = (x - imaged).rowwise().norm().maxCoeff();
-      if (error < correction_tolerance_mm) return report;
-      X -= x - imaged;
-    }
-    throw NumericalFailure(
-        fmt::format("prone → undeformed (fixed point): still {:.3g} mm off after {} corrections (bound {} mm); use "
-                    "--inverse newton",
-                    error, max_corrections, correction_tolerance_mm));
-  }
-
-  const Model& model_;
-  Mechanics mechanics_;
-  EquilibriumSolver solver_;
-};
+Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
+  return {mechanics.mesh(), mechanics.anatomy(), mechanics.layout(), pose};
+}
 
 }  // namespace
 
-ChainSolution solve_chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
-                          const std::vector<PoseLoad>& poses, InverseMethod method, const SolveOptions& options) {
-  const PoseLoad& prone = poses.at(0);
-  check_prone_gravity(prone, anatomy);
-  Chain chain(mesh, anatomy, model, options);
-  chain.check_effects(poses.size() > 1 ? poses.back().name : prone.name);
+Chain::Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
+             std::vector<PoseLoad> poses, SolveOptions options)
+    : poses_(std::move(poses)), mechanics_(mesh, anatomy, model), solver_(mechanics_, std::move(options)) {
+  check_prone_gravity(poses_.at(0), anatomy);
+}
+
+Fields<Dual> Chain::fields(const Model& model, const PoseLoad& pose, const std::string& varied) const {
+  return make_fields(model, scene_of(mechanics_, pose.name), pose.gravity, varied);
+}
+
+void Chain::load(const Model& model, const PoseLoad& pose) { mechanics_.set_fields(values_of(fields(model, pose))); }
+
+ChainSolution Chain::solve(const Model& model, const ChainSolution* near, InverseMethod method) {
+  const meshing::TetMesh& mesh = mechanics_.mesh();
+  solver_.forget();
   ChainSolution solution;
-  solution.inverse = chain.undeformed(prone, method, solution.X);
-  solution.inverse.min_det_f = checked_min_det_f(mesh, mesh.points, solution.X, "undeformed");
-  solution.round_trip = chain.pose(prone, solution.X);
-  const Eigen::VectorXd error = (solution.round_trip.x - mesh.points).rowwise().norm();
+  const Eigen::VectorXd offset = values_of(fields(model, poses_[0])).imaged_offset;
+  solution.prone = mesh.points + Eigen::Map<const Points>(offset.data(), mesh.points.rows(), 3);
+  undeformed(model, method, near, solution);
+  solution.inverse.min_det_f = checked_min_det_f(mesh, solution.prone, solution.X, "undeformed");
+  for (std::size_t p = 1; p < poses_.size(); ++p) {
+    load(model, poses_[p]);
+    Points start;
+    if (near != nullptr) start = solution.X + (near->poses[p - 1].x - near->X);
+    PoseSolution pose{poses_[p].name, {}, {}};
+    pose.report = solver_.forward(solution.X, pose.x, "undeformed → " + pose.name, near != nullptr ? &start : nullptr);
+    pose.report.min_det_f = checked_min_det_f(mesh, pose.x, solution.X, pose.name);
+    solution.poses.push_back(std::move(pose));
+  }
+  return solution;
+}
+
+void Chain::certify(const Model& model, ChainSolution& solution) {
+  solver_.forget();
+  load(model, poses_[0]);
+  solution.round_trip.name = poses_[0].name;
+  solution.round_trip.report = solver_.forward(solution.X, solution.round_trip.x, "undeformed → " + poses_[0].name);
+  const Eigen::VectorXd error = (solution.round_trip.x - solution.prone).rowwise().norm();
   solution.round_trip_max_mm = error.maxCoeff();
   solution.round_trip_rms_mm = std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
-  for (std::size_t p = 1; p < poses.size(); ++p) {
-    solution.poses.push_back(chain.pose(poses[p], solution.X));
-    PoseSolution& pose = solution.poses.back();
-    pose.report.min_det_f = checked_min_det_f(mesh, pose.x, solution.X, pose.name);
+}
+
+void Chain::undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution) {
+  const PoseLoad& prone = poses_[0];
+  if (method == InverseMethod::newton) {
+    load(model, prone);
+    Points start;
+    if (near != nullptr) start = solution.prone + (near->X - near->prone);
+    solution.inverse =
+        solver_.inverse(solution.prone, solution.X, "prone → undeformed", near != nullptr ? &start : nullptr);
+    return;
   }
+  load(model, {prone.name, -prone.gravity});
+  solution.inverse = solver_.forward(solution.prone, solution.X, "prone → undeformed (reversed gravity)");
+  if (method == InverseMethod::fixed_point) correct(model, solution);
+}
+
+void Chain::correct(const Model& model, ChainSolution& solution) {
+  load(model, poses_[0]);
+  SolveReport& report = solution.inverse;
+  double error = 0;
+  for (int correction = 0; correction < max_corrections; ++correction) {
+    Points x;
+    const SolveReport forward = solver_.forward(solution.X, x, "prone → undeformed (fixed point)");
+    report.newton_iterations += forward.newton_iterations;
+    report.factorisations += forward.factorisations;
+    report.load_steps = forward.load_steps;
+    report.residual_share = forward.residual_share;
+    error = (x - solution.prone).rowwise().norm().maxCoeff();
+    if (error < correction_tolerance_mm) return;
+    solution.X -= x - solution.prone;
+  }
+  throw NumericalFailure(
+      fmt::format("prone → undeformed (fixed point): still {:.3g} mm off after {} corrections (bound {} mm); use "
+                  "--inverse newton",
+                  error, max_corrections, correction_tolerance_mm));
+}
+
+ChainSolution solve_chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
+                          const std::vector<PoseLoad>& poses, InverseMethod method, const SolveOptions& options) {
+  Chain chain(mesh, anatomy, model, poses, options);
+  check_effects_act(model, scene_of(chain.mechanics(), poses.back().name));
+  ChainSolution solution = chain.solve(model, nullptr, method);
+  chain.certify(model, solution);
   return solution;
 }
 

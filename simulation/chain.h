@@ -27,19 +27,54 @@ struct PoseSolution {
 };
 
 struct ChainSolution {
-  Points X;  ///< undeformed shape, mm
+  Points prone;  ///< the known shape: imaged nodes, moved by what the model says of the segmentation; mm
+  Points X;      ///< undeformed shape, mm
   SolveReport inverse;
-  PoseSolution round_trip;       ///< prone again, from X and no load
-  double round_trip_max_mm = 0;  ///< largest distance to the imaged nodes
-  double round_trip_rms_mm = 0;
   std::vector<PoseSolution> poses;  ///< all but prone, in the order given
+  PoseSolution round_trip;          ///< prone again, from X and no load; filled by Chain::certify()
+  double round_trip_max_mm = 0;     ///< its largest distance to the known shape
+  double round_trip_rms_mm = 0;
 };
 
-/// prone (imaged) → undeformed → every other pose, with the round trip as certificate.
-/// @param poses  the first one is prone, the imaged pose
-/// @throws NumericalFailure  naming the pose, InputError  prone gravity that points into the muscle (bound: the angle
-/// to
-///   the muscle's outward normal is under 90°)
+/// prone (imaged) → undeformed → every other pose, for one mesh and one kind of model (laws, boundary kinds), as often
+/// as wanted with other numbers and effects. Symbolic work and memory are kept between solves.
+class Chain {
+ public:
+  /// @param mesh, anatomy  of the imaged shape; must outlive the object
+  /// @param poses  the first one is prone, the imaged pose
+  /// @throws InputError  prone gravity that points into the muscle (bound: the angle to the muscle's outward normal is
+  ///   under 90°); what Mechanics refuses
+  Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model, std::vector<PoseLoad> poses,
+        SolveOptions options = {});
+
+  const Mechanics& mechanics() const { return mechanics_; }
+  const std::vector<PoseLoad>& poses() const { return poses_; }
+
+  /// @param model  of the kind given to the constructor: numbers and effects may differ
+  /// @param near   solution for similar numbers to start from, or nullptr to start from the imaged shape and no load;
+  ///   when that fails it starts without
+  /// @throws NumericalFailure  naming the pose
+  ChainSolution solve(const Model& model, const ChainSolution* near = nullptr,
+                      InverseMethod method = InverseMethod::newton);
+
+  /// Makes the round trip: loads solution.X with prone gravity, from no load.
+  void certify(const Model& model, ChainSolution& solution);
+
+  /// Fields of one pose with the derivative with respect to @p varied (make_fields).
+  Fields<Dual> fields(const Model& model, const PoseLoad& pose, const std::string& varied = {}) const;
+
+ private:
+  friend class Sensitivities;
+  void load(const Model& model, const PoseLoad& pose);
+  void undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
+  void correct(const Model& model, ChainSolution& solution);
+
+  std::vector<PoseLoad> poses_;
+  Mechanics mechanics_;
+  EquilibriumSolver solver_;
+};
+
+/// A chain used once, with its round trip and with effects that can change nothing refused.
 ChainSolution solve_chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
                           const std::vector<PoseLoad>& poses, InverseMethod method = InverseMethod::newton,
                           const SolveOptions& options = {});

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "common/error.h"
@@ -20,34 +21,50 @@ constexpr double largest_fall = 0.1;       // det F may fall to this share of it
 
 using Flat = Eigen::Map<Eigen::VectorXd>;
 
+/// Forcing term of an inexact Newton method that keeps quadratic convergence (Eisenstat and Walker 1996, choice 2),
+/// never finer than what the last digits need.
+double linear_tolerance(double residual_share, double share_before) {
+  const double ratio = residual_share / share_before;
+  return std::clamp(0.1 * ratio * ratio, 1e-6, 1e-2);
+}
+
 }  // namespace
 
 EquilibriumSolver::EquilibriumSolver(const Mechanics& mechanics, SolveOptions options)
-    : mechanics_(mechanics), options_(std::move(options)), sums_(mechanics.pattern()) {}
+    : mechanics_(mechanics), options_(std::move(options)), sums_(mechanics.pattern()), direction_(mechanics) {}
 
-SolveReport EquilibriumSolver::forward(const Points& X, Points& x, const std::string& what) {
-  if (mechanics_.has_energy()) {
-    if (!cholesky_) cholesky_ = std::make_unique<CholeskySolver>(sums_.tangent);
-  } else if (!lu_) {
-    lu_ = std::make_unique<LuSolver>(sums_.tangent);  // without an energy ∂r/∂x is not symmetric
-  }
-  x = X;
-  return step_load(Unknown::deformed, X, x, what);
+SolveReport EquilibriumSolver::forward(const Points& X, Points& x, const std::string& what, const Points* start) {
+  return solve(Unknown::deformed, X, x, what, start);
 }
 
-SolveReport EquilibriumSolver::inverse(const Points& x, Points& X, const std::string& what) {
-  if (!lu_) lu_ = std::make_unique<LuSolver>(sums_.reference_tangent);
-  X = x;
-  return step_load(Unknown::undeformed, x, X, what);
+SolveReport EquilibriumSolver::inverse(const Points& x, Points& X, const std::string& what, const Points* start) {
+  return solve(Unknown::undeformed, x, X, what, start);
 }
 
-SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, Points& sought,
-                                         const std::string& what) {
+SolveReport EquilibriumSolver::solve(Unknown unknown, const Points& known, Points& sought, const std::string& what,
+                                     const Points* start) {
   mechanics_.evaluate(State{known, known, 1.0}, Demand{.residual = true}, sums_);
   weight_norm_ = sums_.residual.norm();
-  SolveReport report;
-  factorisations_ = 0;
+  const int factorised_before = direction_.factorisations();
   what_ = what;
+  SolveReport report;
+  if (start != nullptr) {
+    sought = *start;
+    const Attempt attempt = newton(unknown, known, sought, 1.0);
+    if (attempt.converged) {
+      report = {attempt.iterations, direction_.factorisations() - factorised_before, 1, attempt.min_det_f,
+                attempt.residual_share};
+      return report;
+    }
+  }
+  sought = known;
+  report = step_load(unknown, known, sought);
+  report.factorisations = direction_.factorisations() - factorised_before;
+  return report;
+}
+
+SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, Points& sought) {
+  SolveReport report;
   double load = 0, step = 1;
   Points at_load = sought, trial;
   Attempt last;
@@ -78,10 +95,9 @@ SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, P
         "{}: no equilibrium found beyond {:.0f} % of gravity ({}{}). A softer tissue than this shape can carry, or a "
         "poor mesh there: raise breast.young_modulus_kpa or skin.young_modulus_kpa, use law = \"neo_hookean\", or "
         "look at the mesh with supine-tetrahedralise --check",
-        what, 100 * load, last.reason, place));
+        what_, 100 * load, last.reason, place));
   }
   sought = at_load;
-  report.factorisations = factorisations_;
   return report;
 }
 
@@ -93,34 +109,6 @@ void EquilibriumSolver::evaluate(Unknown unknown, const Points& known, const Poi
   const bool forward = unknown == Unknown::deformed;
   const Demand demand{.energy = forward, .residual = true, .tangent = forward, .reference_tangent = !forward};
   mechanics_.evaluate(state_of(unknown, known, sought, load), demand, sums_);
-}
-
-bool EquilibriumSolver::direction(Unknown unknown, const State& state, Eigen::VectorXd& step) {
-  if (unknown == Unknown::deformed && mechanics_.has_energy()) return descent_direction(state, step);
-  ++factorisations_;
-  exact_direction_ = true;
-  if (!lu_->factorise(unknown == Unknown::undeformed ? sums_.reference_tangent : sums_.tangent)) return false;
-  step = -lu_->solve(sums_.residual);
-  return step.allFinite();
-}
-
-bool EquilibriumSolver::descent_direction(const State& state, Eigen::VectorXd& step) {
-  // The exact tangent where it is positive definite; where it is not, the one without the skin's negative curvature;
-  // and if the tissue's is negative too, with the smallest shift that makes it so.
-  double shift = 0;
-  for (int attempt = 0; attempt < 10; ++attempt) {
-    ++factorisations_;
-    if (cholesky_->factorise(sums_.tangent, shift)) {
-      exact_direction_ = attempt == 0;
-      step = -cholesky_->solve(sums_.residual);
-      return step.allFinite();
-    }
-    if (attempt == 0)
-      mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true, .convex = true}, sums_);
-    else
-      shift = attempt == 1 ? 1e-4 * sums_.tangent.diagonal().cwiseAbs().mean() : 6 * shift;
-  }
-  return false;
 }
 
 void EquilibriumSolver::note_state(Attempt& attempt) const {
@@ -162,6 +150,7 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
     return fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iteration, share);
   };
   Eigen::VectorXd step;
+  double share_before = 1;
   double at_window = std::numeric_limits<double>::infinity();  // residual when the present window of iterations began
   evaluate(unknown, known, sought, load);
   for (int iteration = 0;; ++iteration) {
@@ -171,7 +160,7 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
     const double moved = iteration == 0 ? longest_step_mm : step.cwiseAbs().maxCoeff();
     attempt.converged =
         attempt.residual_share <= options_.residual_tolerance ||
-        (moved < options_.step_tolerance_mm && exact_direction_ && attempt.residual_share <= loosest_residual);
+        (moved < options_.step_tolerance_mm && direction_.exact() && attempt.residual_share <= loosest_residual);
     if (attempt.converged) return attempt;
     if (iteration % stall_window == 0) {
       if (attempt.residual_share > stall_share * at_window) return give_up(stalled(iteration, attempt.residual_share));
@@ -179,8 +168,12 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
     }
     if (iteration == options_.max_iterations) return give_up(stalled(iteration, attempt.residual_share));
     ++attempt.iterations;
-    if (!direction(unknown, state_of(unknown, known, sought, load), step))
-      return give_up("the tangent matrix is singular");
+    const State state = state_of(unknown, known, sought, load);
+    const double tolerance = linear_tolerance(attempt.residual_share, share_before);
+    share_before = attempt.residual_share;
+    const bool found = unknown == Unknown::deformed ? direction_.deformed(state, tolerance, moved, sums_, step)
+                                                    : direction_.undeformed(state, tolerance, sums_, step);
+    if (!found) return give_up("the tangent matrix is singular");
     const double longest = step.cwiseAbs().maxCoeff();
     if (longest > longest_step_mm) step *= longest_step_mm / longest;
     if (!search_line(unknown, known, sought, load, step))

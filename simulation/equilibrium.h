@@ -2,11 +2,10 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <string>
 
-#include "simulation/linear_solver.h"
 #include "simulation/mechanics.h"
+#include "simulation/newton_direction.h"
 
 namespace supine::simulation {
 
@@ -21,7 +20,7 @@ struct SolveOptions {
 
 struct SolveReport {
   int newton_iterations = 0;  ///< over all load steps
-  int factorisations = 0;     ///< more than iterations where the energy is not convex
+  int factorisations = 0;     ///< fewer than iterations where one serves several, more where the energy is not convex
   int load_steps = 0;         ///< completed
   double min_det_f = 1;
   double residual_share = 0;  ///< |r| / |weight| at the end
@@ -36,12 +35,16 @@ class EquilibriumSolver {
   /// Deformed shape for a known undeformed one. Merit: energy (|r| for a law without energy).
   /// @param X  undeformed nodes   @param x  out: equilibrium at full load, reached from x = X and no load
   /// @param what  names the solve in messages, for example "supine"
+  /// @param start  a shape close to the answer, tried first at full load; or nullptr
   /// @throws NumericalFailure  load fraction reached, worst element and place, what to change; x is then undefined
-  SolveReport forward(const Points& X, Points& x, const std::string& what);
+  SolveReport forward(const Points& X, Points& x, const std::string& what, const Points* start = nullptr);
 
   /// Undeformed shape whose equilibrium under the load is the known deformed one (Govindjee and Mihalic 1996;
   /// Mazier et al. 2022). Unknown X, matrix ∂r/∂X. Merit: |r|.
-  SolveReport inverse(const Points& x, Points& X, const std::string& what);
+  SolveReport inverse(const Points& x, Points& X, const std::string& what, const Points* start = nullptr);
+
+  /// Forgets what earlier solves left behind to save work, so that the next ones give the same bytes as after making.
+  void forget() { direction_.forget(); }
 
  private:
   enum class Unknown { deformed, undeformed };
@@ -53,24 +56,20 @@ class EquilibriumSolver {
     int min_cell = -1;
     double residual_share = 0;
   };
-  SolveReport step_load(Unknown unknown, const Points& known, Points& sought, const std::string& what);
+  SolveReport solve(Unknown unknown, const Points& known, Points& sought, const std::string& what, const Points* start);
+  SolveReport step_load(Unknown unknown, const Points& known, Points& sought);
   void note_state(Attempt& attempt) const;
   bool search_line(Unknown unknown, const Points& known, Points& sought, double load, const Eigen::VectorXd& step);
   Attempt newton(Unknown unknown, const Points& known, Points& sought, double load);
   static State state_of(Unknown unknown, const Points& known, const Points& sought, double load);
   void evaluate(Unknown unknown, const Points& known, const Points& sought, double load);
-  bool direction(Unknown unknown, const State& state, Eigen::VectorXd& step);
-  bool descent_direction(const State& state, Eigen::VectorXd& step);
 
   const Mechanics& mechanics_;
   SolveOptions options_;
   Sums sums_;
-  std::unique_ptr<CholeskySolver> cholesky_;
-  std::unique_ptr<LuSolver> lu_;
+  NewtonDirection direction_;
   double weight_norm_ = 0;
-  int factorisations_ = 0;
-  std::string what_;             // the solve under way, for progress and messages
-  bool exact_direction_ = true;  // the last step came from the exact tangent: its length says how far the answer is
+  std::string what_;  // the solve under way, for progress and messages
 };
 
 }  // namespace supine::simulation

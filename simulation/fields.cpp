@@ -4,16 +4,32 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <set>
+#include <mutex>
 
 #include "common/error.h"
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
 #include "simulation/elements.h"
 #include "simulation/parameters.h"
+#include "simulation/skin_offset.h"
 #include "simulation/surface_geometry.h"
 
 namespace supine::simulation {
+
+class SkinOffsetOnce {
+ public:
+  const Eigen::VectorXd& of(const Scene& scene) {
+    std::call_once(once_, [this, &scene] { column_ = skin_offset(scene.mesh, *scene.anatomy.muscle); });
+    return column_;
+  }
+
+ private:
+  std::once_flag once_;
+  Eigen::VectorXd column_;
+};
+
+const Eigen::VectorXd& Layout::unit_skin_offset(const Scene& scene) const { return skin_offset_once->of(scene); }
+
 namespace {
 
 using reconstruction::Region;
@@ -67,6 +83,7 @@ Layout layout_of(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy) 
   layout.skin = face_group<Face>(mesh, anatomy, faces_of(mesh, {Region::skin}));
   layout.interface = quadrature_group<Face>(mesh, anatomy, faces_of(mesh, {Region::inner, Region::ligament}));
   layout.cut = quadrature_group<Face>(mesh, anatomy, faces_of(mesh, {Region::cut}));
+  layout.skin_offset_once = std::make_shared<SkinOffsetOnce>();
   layout.cell_q.resize(mesh.cells.rows(), 2);
   for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
     layout.cell_q.row(c).setZero();
@@ -90,6 +107,13 @@ Fields<Dual> base_fields(const Model& model, const Scene& scene, const Eigen::Ve
   Fields<Dual> fields;
   fields.ln_young = constant(cells, ceres::log(number("breast.young_modulus_kpa")));
   fields.poisson = constant(cells, number("breast.poisson_ratio"));
+  fields.law_shape_1 = fields.law_shape_2 = constant(cells, Dual(0.0));
+  if (model.breast.law == BulkLaw::mooney_rivlin) fields.law_shape_1 = constant(cells, number("breast.mooney_share"));
+  if (model.breast.law == BulkLaw::gent) fields.law_shape_1 = constant(cells, number("breast.gent_limit"));
+  if (model.breast.law == BulkLaw::yeoh) {
+    fields.law_shape_1 = constant(cells, number("breast.yeoh_c2_ratio"));
+    fields.law_shape_2 = constant(cells, number("breast.yeoh_c3_ratio"));
+  }
   fields.density = constant(cells, number("breast.density_kg_m3") * 1e-9);  // kg/m³ → kg/mm³
   fields.skin_modulus = constant(skin, number("skin.young_modulus_kpa") * number("skin.thickness_mm"));
   fields.skin_poisson = constant(skin, number("skin.poisson_ratio"));
@@ -133,6 +157,41 @@ EffectSetting with_typical_values(EffectSetting setting) {
   return setting;
 }
 
+/// Names of the columns that the effect, alone and of ordinary size, changes in prone or in the scene's pose.
+std::vector<std::string> changed_columns(const Model& model, const EffectSetting& setting, const Scene& scene) {
+  Model alone = model, without = model;
+  alone.effects = {with_typical_values(setting)};
+  without.effects.clear();
+  const Eigen::Vector3d gravity = Eigen::Vector3d(1, 2, 3).normalized();  // no rotation leaves it as it is
+  std::vector<std::string> changed;
+  for (const std::string& pose : {std::string("prone"), scene.pose}) {
+    const Scene place{scene.mesh, scene.anatomy, scene.layout, pose};
+    const auto with = values_of(make_fields(alone, place, gravity));
+    const auto base = values_of(make_fields(without, place, gravity));
+    for (const auto& [name, column] : field_columns<double>)
+      if (with.*column != base.*column) changed.push_back(name);
+  }
+  return changed;
+}
+
+/// Why no force of this model depends on a column, or nullptr where one does.
+const char* why_unread(const Model& model, const std::string& column) {
+  const auto is = [&column](std::initializer_list<const char*> names) {
+    return std::find(names.begin(), names.end(), column) != names.end();
+  };
+  if (model.interface.kind == InterfaceKind::fixed &&
+      is({"interface_normal", "interface_tangential", "interface_friction", "muscle_offset"}))
+    return "interface.kind = \"fixed\" holds the whole inner surface; use \"sliding\" or remove the effect";
+  if (model.breast.law != BulkLaw::neo_hookean && is({"stiffening"}))
+    return "it acts on breast.law = \"neo_hookean\" only (yeoh and gent stiffen by numbers of their own; mooney_rivlin, "
+           "neo_hookean_calculix, corotational and corotational_qr do not); change the law or remove the effect";
+  if (model.skin.young_modulus_kpa.value == 0 && is({"skin_prestretch", "skin_stiffening"}))
+    return "skin.young_modulus_kpa = 0 leaves no skin; give it a modulus or remove the effect";
+  if (model.skin.law != SkinLaw::neo_hookean && is({"skin_stiffening"}))
+    return "it acts on skin.law = \"neo_hookean\" only; change the law or remove the effect";
+  return nullptr;
+}
+
 template <class Part>
 Fields<double> each_entry(const Fields<Dual>& fields, const Part& part) {
   Fields<double> out;
@@ -170,34 +229,22 @@ Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Ve
 
 void check_effects_act(const Model& model, const Scene& scene) {
   for (const EffectSetting& setting : model.effects) {
-    Model alone = model;
-    alone.effects = {with_typical_values(setting)};
-    Model without = model;
-    without.effects.clear();
-    const Eigen::Vector3d gravity = Eigen::Vector3d(1, 2, 3).normalized();  // no rotation leaves it as it is
-    const auto with = values_of(make_fields(alone, scene, gravity));
-    const auto base = values_of(make_fields(without, scene, gravity));
-    std::set<std::string> changed;
-    for (std::size_t c = 0; c < std::size(field_columns<double>); ++c)
-      if (with.*field_columns<double>[c].column != base.*field_columns<double>[c].column)
-        changed.insert(field_columns<double>[c].name);
-    const bool on_interface = changed.contains("interface_normal") || changed.contains("interface_tangential") ||
-                              changed.contains("interface_friction") || changed.contains("muscle_offset");
-    const bool on_stiffening = changed.contains("stiffening");
-    const bool elsewhere = changed.size() > static_cast<std::size_t>(changed.contains("interface_normal") +
-                                                                     changed.contains("interface_tangential") +
-                                                                     changed.contains("interface_friction") +
-                                                                     changed.contains("muscle_offset") + on_stiffening);
     const auto refuse = [&setting](const char* reason) {
       throw InputError(fmt::format("effect '{}' cannot change anything here: {}", setting.name, reason));
     };
-    if (elsewhere) continue;
-    if (on_stiffening && model.breast.law != BulkLaw::neo_hookean)
-      refuse("it acts on breast.law = \"neo_hookean\" only; change the law or remove the effect");
-    if (on_interface && model.interface.kind != InterfaceKind::sliding)
-      refuse("interface.kind = \"fixed\" holds the whole inner surface; use \"sliding\" or remove the effect");
-    if (!on_interface && !on_stiffening)
-      refuse("the mesh has no tissue of its kind, or nothing lies where it acts (offset_mm, arc); remove the effect");
+    if (scene.pose == "prone" && find_effect(setting.name) != nullptr && find_effect(setting.name)->needs_other_pose())
+      refuse("prone is the only pose and it acts between poses; give the case another one or remove the effect");
+    const char* unread = nullptr;
+    bool acts = false;
+    for (const std::string& column : changed_columns(model, setting, scene)) {
+      const char* reason = why_unread(model, column);
+      acts = acts || reason == nullptr;
+      if (unread == nullptr) unread = reason;
+    }
+    if (acts) continue;
+    refuse(unread != nullptr ? unread
+                             : "the mesh has no tissue of its kind, or nothing lies where it acts (offset_mm, arc); "
+                               "remove the effect");
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 
 #include "common/arrays.h"
 #include "simulation/catalogue.h"
@@ -26,6 +27,8 @@ struct Fields {
   Column ln_young;       ///< #cells; ln of Young's modulus in kPa
   Column poisson;        ///< #cells; 0 to 0.5 exclusive
   Column stiffening;     ///< #cells; b of the exponential law, >= 0
+  Column law_shape_1;    ///< #cells; mooney_rivlin: share of C01, yeoh: C2/C1, gent: limit Jm; 0 for other laws
+  Column law_shape_2;    ///< #cells; yeoh: C3/C1; 0 for other laws
   Column fibre_modulus;  ///< #cells; k_f in kPa of fibres along the muscle's outward normal, >= 0
   Column density;        ///< #cells; kg/mm³
 
@@ -58,6 +61,8 @@ template <class T>
 inline constexpr FieldColumn<T> field_columns[] = {{"ln_young", &Fields<T>::ln_young},
                                                    {"poisson", &Fields<T>::poisson},
                                                    {"stiffening", &Fields<T>::stiffening},
+                                                   {"law_shape_1", &Fields<T>::law_shape_1},
+                                                   {"law_shape_2", &Fields<T>::law_shape_2},
                                                    {"fibre_modulus", &Fields<T>::fibre_modulus},
                                                    {"density", &Fields<T>::density},
                                                    {"skin_modulus", &Fields<T>::skin_modulus},
@@ -82,11 +87,18 @@ struct FaceGroup {
   Eigen::VectorXd area_mm2;  ///< #points; imaged area each point stands for
 };
 
+class SkinOffsetOnce;
+
 struct Layout {
   FaceGroup skin;       ///< one point per face: its centroid
   FaceGroup interface;  ///< inner and ligament regions, quadrature points
   FaceGroup cut;        ///< quadrature points
   Table cell_q;         ///< #cells by 2, anatomy coordinates of cell centroids
+
+  /// skin_offset() of the scene's mesh, which must be the layout's own; found when first asked for, then kept. Threads
+  /// may ask at the same time.
+  const Eigen::VectorXd& unit_skin_offset(const Scene& scene) const;
+  std::shared_ptr<SkinOffsetOnce> skin_offset_once;
 };
 
 Layout make_layout(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy);

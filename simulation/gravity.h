@@ -6,12 +6,12 @@
 
 namespace supine::simulation {
 
-/// Weight of the tissue. With DensityReference::imaged the mass of each node comes from the imaged volume and stays;
-/// with undeformed it is ρ × undeformed volume and enters ∂r/∂X.
+/// Weight of the tissue. With DensityReference::imaged the mass of each node comes from the imaged volume and stays:
+/// the imaged nodes moved by Fields::imaged_offset. With undeformed it is ρ × undeformed volume and enters ∂r/∂X.
 template <class Element>
 class GravityTerm : public Term {
  public:
-  /// @param imaged  prone nodes, mm
+  /// @param imaged  prone nodes as segmented, mm
   GravityTerm(const Indices& cells, const Pattern& pattern, const Points& imaged, DensityReference reference);
 
   void set_fields(const Fields<double>& fields) override;
@@ -20,9 +20,10 @@ class GravityTerm : public Term {
 
  private:
   void add_force(const State& state, const Points& weight, const Demand& demand, Sums& sums) const;
+  void add_mass_derivative(const State& state, const Points& imaged_velocity, Sums& sums) const;
 
   Elements elements_;
-  Points imaged_;
+  Points given_, imaged_;  // as segmented, and moved by the offset
   DensityReference reference_;
   Points weight_;  // per cell: density × gravity, mN/mm³
 };

@@ -4,25 +4,28 @@
 #include <memory>
 #include <string>
 
-#include "simulation/assembly.h"
+#include "simulation/spd_solver.h"
 
 namespace supine::simulation {
 
-/// Direct solvers that keep their symbolic analysis: one pattern, many numeric factorisations.
+/// Cholesky factors of symmetric matrices with 3 by 3 node blocks; one analysis, many numeric factorisations.
 /// BLAS runs on one thread, so that results do not depend on the number of threads.
-class CholeskySolver {
+class CholeskySolver : public SpdSolver {
  public:
   explicit CholeskySolver(const SparseMatrix& pattern);
-  ~CholeskySolver();
-  /// Factorises K + shift I (lower triangle read). @return false when that is not positive definite
-  bool factorise(const SparseMatrix& matrix, double shift = 0);
+  ~CholeskySolver() override;
+  bool factorise(const SparseMatrix& matrix, double shift = 0) override;
+  void solve(const Eigen::VectorXd& right_hand_side, Eigen::VectorXd& solution) const override;
   Eigen::VectorXd solve(const Eigen::VectorXd& right_hand_side) const;
+  double solves_per_factor() const override;
+  bool direct() const override { return true; }
 
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
 
+/// LU factors of unsymmetric matrices with a symmetric pattern; one analysis, many numeric factorisations.
 class LuSolver {
  public:
   explicit LuSolver(const SparseMatrix& pattern);
@@ -30,6 +33,7 @@ class LuSolver {
   /// @return false when the matrix is singular
   bool factorise(const SparseMatrix& matrix);
   Eigen::VectorXd solve(const Eigen::VectorXd& right_hand_side) const;
+  Eigen::VectorXd solve_transposed(const Eigen::VectorXd& right_hand_side) const;
 
  private:
   struct State;

@@ -4,10 +4,12 @@
 #include "common/error.h"
 #include "simulation/bulk.h"
 #include "simulation/cut.h"
+#include "simulation/fibres.h"
 #include "simulation/gravity.h"
 #include "simulation/interface.h"
 #include "simulation/skin.h"
 #include "simulation/tet_geometry.h"
+#include "simulation/traction.h"
 
 namespace supine::simulation {
 namespace {
@@ -18,12 +20,15 @@ template <class Cell, class Face>
 std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy,
                                               const Model& model, const Layout& layout, const Pattern& pattern) {
   std::vector<std::unique_ptr<Term>> terms;
-  terms.push_back(std::make_unique<BulkTerm<Cell>>(mesh.cells, pattern, model.breast.law));
+  terms.push_back(std::make_unique<BulkTerm<Cell>>(mesh.cells, pattern,
+                                                   BulkSettings{model.breast.law, model.breast.volumetric}));
+  terms.push_back(std::make_unique<FibreTerm<Cell>>(mesh.cells, pattern, anatomy.muscle));
   terms.push_back(
       std::make_unique<GravityTerm<Cell>>(mesh.cells, pattern, mesh.points, model.breast.density_refers_to));
   if (model.skin.young_modulus_kpa.value > 0)
     terms.push_back(std::make_unique<SkinTerm<Face>>(rows_of(mesh.faces, layout.skin.faces), pattern,
                                                      SkinSettings{model.skin.law, model.skin.compression}));
+  terms.push_back(std::make_unique<TractionTerm<Face>>(rows_of(mesh.faces, layout.skin.faces), pattern));
   if (model.interface.kind == InterfaceKind::sliding)
     terms.push_back(
         std::make_unique<InterfaceTerm<Face>>(rows_of(mesh.faces, layout.interface.faces), pattern, anatomy.muscle));

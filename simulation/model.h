@@ -18,7 +18,8 @@ struct Setting {
   double upper = std::numeric_limits<double>::infinity();
 };
 
-enum class BulkLaw { neo_hookean, corotational, corotational_qr };
+enum class BulkLaw { neo_hookean, mooney_rivlin, yeoh, gent, neo_hookean_calculix, corotational, corotational_qr };
+enum class Volumetric { mean, pointwise };
 enum class SkinLaw { neo_hookean, corotational };
 enum class Compression { tension_field, full };
 enum class InterfaceKind { sliding, fixed };
@@ -38,6 +39,11 @@ struct Model {
     BulkLaw law = BulkLaw::neo_hookean;
     Setting young_modulus_kpa{0.5};
     Setting poisson_ratio{0.45};
+    Volumetric volumetric = Volumetric::mean;  ///< quadratic cells near incompressibility
+    Setting mooney_share{0.5};                 ///< mooney_rivlin only: C01 / (C10 + C01)
+    Setting yeoh_c2_ratio{1.0};                ///< yeoh only: C2 / C1
+    Setting yeoh_c3_ratio{0.0};                ///< yeoh only: C3 / C1
+    Setting gent_limit{4.0};                   ///< gent only: Jm
     Setting density_kg_m3{1000};
     DensityReference density_refers_to = DensityReference::imaged;
   } breast;

@@ -12,8 +12,11 @@ struct Parameter {
   double null = 0;   ///< the value at which an effect leaves the model unchanged
   double lower = 0;  ///< admissible range, inclusive unless the reader says otherwise
   double upper = 0;
-  double median = 0;       ///< typical size, prior median
-  double log_sd = 0;       ///< prior spread: of ln(value) for positive quantities
+  /// Typical size: the value where a model names none, and the prior's median. Null where no sign is likelier.
+  double median = 0;
+  /// Prior spread. One-sided rows are log-normal: standard deviation of ln(value). Two-sided ones are normal: standard
+  /// deviation of the value itself, in its own unit.
+  double log_sd = 0;
   bool one_sided = false;  ///< only values above null make sense
   std::string meaning;     ///< one line for help and messages
 };

@@ -23,6 +23,10 @@ const Parameter* find_parameter(const std::string& name) {
 Setting& base_setting(Model& model, const std::string& name) {
   if (name == "breast.young_modulus_kpa") return model.breast.young_modulus_kpa;
   if (name == "breast.poisson_ratio") return model.breast.poisson_ratio;
+  if (name == "breast.mooney_share") return model.breast.mooney_share;
+  if (name == "breast.yeoh_c2_ratio") return model.breast.yeoh_c2_ratio;
+  if (name == "breast.yeoh_c3_ratio") return model.breast.yeoh_c3_ratio;
+  if (name == "breast.gent_limit") return model.breast.gent_limit;
   if (name == "breast.density_kg_m3") return model.breast.density_kg_m3;
   if (name == "skin.young_modulus_kpa") return model.skin.young_modulus_kpa;
   if (name == "skin.thickness_mm") return model.skin.thickness_mm;
@@ -36,6 +40,19 @@ Setting& base_setting(Model& model, const std::string& name) {
 
 const Setting& base_setting(const Model& model, const std::string& name) {
   return base_setting(const_cast<Model&>(model), name);
+}
+
+std::string why_not_of(const Model& model, const std::string& name) {
+  const auto belongs = [&name](const std::string& law) {
+    return "belongs to law = \"" + law + "\"; leave it out or choose that law";
+  };
+  const BulkLaw law = model.breast.law;
+  if (name == "breast.mooney_share" && law != BulkLaw::mooney_rivlin) return belongs("mooney_rivlin");
+  if (name.starts_with("breast.yeoh_") && law != BulkLaw::yeoh) return belongs("yeoh");
+  if (name == "breast.gent_limit" && law != BulkLaw::gent) return belongs("gent");
+  if (name == "skin.poisson_ratio" && model.skin.law == SkinLaw::neo_hookean)
+    return "the neo_hookean skin is incompressible and has none; leave it out or use law = \"corotational\"";
+  return {};
 }
 
 Setting* find_setting(Model& model, const std::string& name) {

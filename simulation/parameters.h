@@ -21,6 +21,9 @@ const Parameter* find_parameter(const std::string& name);
 Setting& base_setting(Model& model, const std::string& name);
 const Setting& base_setting(const Model& model, const std::string& name);
 
+/// Why a number of the base model means nothing to the laws of this model; empty where it does.
+std::string why_not_of(const Model& model, const std::string& name);
+
 /// The number that @p name stands for in this model, or nullptr: no such parameter, or its effect is not in the model.
 Setting* find_setting(Model& model, const std::string& name);
 

@@ -130,7 +130,8 @@ void add_membrane_tangent(const MembraneTangent& point, const Eigen::Matrix<doub
 
 template <class T>
 SkinMaterial<T> skin_material(const Fields<T>& fields, Eigen::Index e) {
-  return {fields.skin_modulus[e], fields.skin_poisson[e], fields.skin_compression[e], fields.skin_prestretch[e]};
+  return {fields.skin_modulus[e], fields.skin_poisson[e], fields.skin_compression[e], fields.skin_prestretch[e],
+          fields.skin_stiffening[e]};
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "simulation/model.h"
 
@@ -21,6 +23,7 @@ struct SkinMaterial {
   T poisson;            ///< corotational only
   T compression_share;  ///< share of the full energy that stays where the membrane would wrinkle
   T prestretch;         ///< stretch already there in the undeformed shape
+  T stiffening = T(0);  ///< b of the exponential law, >= 0; neo_hookean only
 };
 
 /// Value part of a number that may carry derivatives.
@@ -44,6 +47,7 @@ struct SkinEnergy {
 
 /// Full membrane energy. neo_hookean: 1/6 (a + 1/b - 3) (incompressible, μ = E/3).
 /// corotational: plane stress 1/(2(1-ν²)) [(λ1-1)² + (λ2-1)² + 2ν(λ1-1)(λ2-1)], with λ1+λ2 = √(a+2√b).
+/// Neither stiffens: see stiffened().
 template <class T, class S>
 SkinEnergy<T> full_skin_energy(SkinLaw law, const S& nu, const PlaneInvariants<T>& c) {
   using std::sqrt;
@@ -84,14 +88,36 @@ SkinEnergy<T> relaxed_skin_energy(SkinLaw law, const S& nu, const PlaneInvariant
   return {0.5 * (stretch - 1.0) * (stretch - 1.0), slope * first_a, slope * first_b};
 }
 
+/// A neo-Hookean energy ψ = w/6 made to stiffen (the two-dimensional form of Fung's and Demiray's exponential): w
+/// becomes (e^{βw} - 1)/β, β >= 0, unchanged at β = 0. The relaxed energy stays the lowest over the widths, because the
+/// new one grows with the old: the same formula serves both, and both stay C1 across the borders.
+template <class T, class S>
+SkinEnergy<T> stiffened(const SkinEnergy<T>& e, const S& beta) {
+  using std::exp;
+  const T w = 6.0 * e.psi, argument = beta * w;
+  const T growth = exp(argument);
+  // (e^z - 1)/z by its series where the quotient would lose digits; at β = 0 it is 1 with the right slope in β.
+  const T mean = std::abs(value_of(argument)) < 1e-3
+                     ? T(1.0 + argument * (0.5 + argument * (1.0 / 6 + argument * (1.0 / 24 + argument / 120.0))))
+                     : T((growth - 1.0) / argument);
+  return {e.psi * mean, growth * e.psi_a, growth * e.psi_b};
+}
+
+/// What the skin carries. tension_field: relaxed + share × (full - relaxed); only the relaxed part stiffens, so that
+/// the share stays a weak spring in wrinkles however compressed they are. full: the full energy, stiffened.
 template <class T, class S>
 SkinEnergy<T> skin_energy(const SkinSettings& s, const SkinMaterial<S>& m, const PlaneInvariants<T>& c) {
+  const bool stiffens = s.law == SkinLaw::neo_hookean && (!std::is_same_v<S, double> || value_of(m.stiffening) > 0);
   const SkinEnergy<T> full = full_skin_energy(s.law, m.poisson, c);
-  if (s.compression == Compression::full) return full;
+  if (s.compression == Compression::full) return stiffens ? stiffened(full, m.stiffening) : full;
   const SkinEnergy<T> relaxed = relaxed_skin_energy(s.law, m.poisson, c);
   const S& w = m.compression_share;
-  return {(1.0 - w) * relaxed.psi + w * full.psi, (1.0 - w) * relaxed.psi_a + w * full.psi_a,
-          (1.0 - w) * relaxed.psi_b + w * full.psi_b};
+  if (!stiffens)
+    return {(1.0 - w) * relaxed.psi + w * full.psi, (1.0 - w) * relaxed.psi_a + w * full.psi_a,
+            (1.0 - w) * relaxed.psi_b + w * full.psi_b};
+  const SkinEnergy<T> stiff = stiffened(relaxed, m.stiffening);
+  return {stiff.psi + w * (full.psi - relaxed.psi), stiff.psi_a + w * (full.psi_a - relaxed.psi_a),
+          stiff.psi_b + w * (full.psi_b - relaxed.psi_b)};
 }
 
 }  // namespace supine::simulation

@@ -182,8 +182,8 @@ class SimulateTool : public Tool {
         write_landmarks({landmarks->names, landmark_places->at(x)}, run.output(folder() / (name + "_landmarks.csv")));
       return file;
     };
-    const Eigen::VectorXd error = (solution.round_trip.x - in.mesh.points).rowwise().norm();
-    const fs::path prone = write_shape("prone", in.mesh.points, {{"round_trip_error_mm", error}});
+    const Eigen::VectorXd error = (solution.round_trip.x - solution.prone).rowwise().norm();
+    const fs::path prone = write_shape("prone", solution.prone, {{"round_trip_error_mm", error}});
     const fs::path undeformed = write_shape("undeformed", solution.X, {});
     run.figures(prone) = figures(in, solution, solution.round_trip.report, in.mesh.points);
     run.figures(undeformed) = figures(in, solution, solution.inverse, solution.X);

@@ -12,6 +12,7 @@ class GravityTilt : public Effect {
   std::string name() const override { return "gravity_tilt"; }
   std::string meaning() const override { return "gravity of the measured poses points elsewhere than the case says"; }
   const std::vector<Parameter>& parameters() const override;
+  bool needs_other_pose() const override { return true; }
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 };

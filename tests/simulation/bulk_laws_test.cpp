@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 
+#include "simulation/bulk.h"
 #include "simulation/catalogue.h"
 #include "tests/support/taylor.h"
 
@@ -24,10 +25,12 @@ Matrix3 stretched(unsigned seed = 1) {
 struct Case {
   BulkLaw law;
   double stiffening;
+  std::array<double, 2> shape{};
 };
 
 class BulkLawTest : public ::testing::TestWithParam<Case> {
  protected:
+  BulkLawTest() { material.shape = GetParam().shape; }
   BulkMaterial<double> material = bulk_material<double>(0.5, 0.45, GetParam().stiffening);
   BulkLaw law = GetParam().law;
   bool has_energy = law != BulkLaw::corotational_qr;
@@ -77,11 +80,15 @@ TEST_P(BulkLawTest, StressTurnsWithTheBody) {
 
 TEST_P(BulkLawTest, StressFollowsItsMaterial) {
   const Matrix3 f = stretched(5);
-  const auto at = [&](double h) {
-    return bulk_stress<double>(law, f, bulk_material<double>(0.5 * std::exp(h), 0.4 + 0.3 * h, 0.2 + h), rest);
+  const auto material_at = [&](const auto& h) {
+    using std::exp;
+    using T = std::decay_t<decltype(h)>;
+    auto moved = bulk_material<T>(0.5 * exp(h), 0.4 + 0.3 * h, 0.2 + h);
+    moved.shape = {GetParam().shape[0] * (1.0 + 0.4 * h), GetParam().shape[1] * (1.0 - 0.7 * h)};
+    return moved;
   };
-  const BulkMaterial<Dual> moving =
-      bulk_material<Dual>(0.5 * ceres::exp(Dual(0.0, 0)), 0.4 + 0.3 * Dual(0.0, 0), 0.2 + Dual(0.0, 0));
+  const auto at = [&](double h) { return bulk_stress<double>(law, f, material_at(h), rest); };
+  const BulkMaterial<Dual> moving = material_at(Dual(0.0, 0));
   const auto p = bulk_stress<Dual>(law, f, moving, rest);
   Matrix3 slope;
   for (int i = 0; i < 9; ++i) slope(i / 3, i % 3) = p(i / 3, i % 3).v[0];
@@ -98,7 +105,10 @@ TEST_P(BulkLawTest, SmallStrainIsHookes) {
 
 INSTANTIATE_TEST_SUITE_P(Laws, BulkLawTest,
                          ::testing::Values(Case{BulkLaw::neo_hookean, 0}, Case{BulkLaw::neo_hookean, 1.5},
-                                           Case{BulkLaw::corotational, 0}, Case{BulkLaw::corotational_qr, 0}));
+                                           Case{BulkLaw::mooney_rivlin, 0, {0.4, 0}},
+                                           Case{BulkLaw::yeoh, 0, {0.8, 0.3}}, Case{BulkLaw::gent, 0, {2.5, 0}},
+                                           Case{BulkLaw::neo_hookean_calculix, 0}, Case{BulkLaw::corotational, 0},
+                                           Case{BulkLaw::corotational_qr, 0}));
 
 TEST(PolarRotation, IsTheNearestRotation) {
   const Matrix3 f = stretched(11), r = polar_rotation(f);
@@ -119,20 +129,136 @@ TEST(CorotationalQr, DependsOnTheOrderOfCornersAndPolarDoesNot) {
   EXPECT_EQ(difference(BulkLaw::corotational), 0);
 }
 
-TEST(CorotationalQr, RestDerivativeIsRight) {
-  const Matrix3 f = stretched(4);
-  const BulkMaterial<double> m = bulk_material<double>(0.5, 0.45, 0);
-  const Eigen::MatrixXd v = random_matrix(3, 2, 5);
-  const auto d = qr_rest_derivative(f, m, rest);
-  Eigen::Matrix<double, 6, 1> direction;
-  direction << v.col(0), v.col(1);
-  const Eigen::Matrix<double, 9, 1> flat = d * direction;
-  Matrix3 slope;
-  for (int i = 0; i < 9; ++i) slope(i / 3, i % 3) = flat[i];
-  ASSERT_GT(slope.norm(), 1e-3);
-  EXPECT_GT(
-      taylor_order([&](double h) { return bulk_stress<double>(BulkLaw::corotational_qr, f, m, rest + h * v); }, slope),
-      1.9);
+// Values worked out by hand from the energies of the header, E = 0.5, ν = 0.45, so μ = 5/29 and λ = 45/29.
+struct Worked {
+  BulkLaw law;
+  std::array<double, 2> shape;
+  /// dW/dI1, dW/dI2 and W_L of a state, as the formulas give them.
+  std::array<double, 3> (*slopes)(double mu, double lambda, double i1, double log_j, double j);
+};
+
+class WorkedLaw : public ::testing::TestWithParam<Worked> {
+ protected:
+  static constexpr double mu = 5.0 / 29, lambda = 45.0 / 29;
+  Matrix3 stress(const Matrix3& f) const {
+    BulkMaterial<double> m = bulk_material<double>(0.5, 0.45, 0);
+    m.shape = GetParam().shape;
+    return bulk_stress<double>(GetParam().law, f, m, rest);
+  }
+};
+
+// Principal stretches a, b, c: P_1 = 2 a W1 + 2 a (b² + c²) W2 + W_L / a.
+TEST_P(WorkedLaw, StretchedAlongItsAxes) {
+  for (const Eigen::Vector3d& s :
+       {Eigen::Vector3d(1.4, 1, 1), Eigen::Vector3d(1.2, 1.2, 1.2), Eigen::Vector3d(0.7, 1.1, 1.3)}) {
+    const double j = s.prod(), log_j = std::log(j);
+    const auto [w1, w2, wl] = GetParam().slopes(mu, lambda, s.squaredNorm(), log_j, j);
+    const Matrix3 p = stress(s.asDiagonal());
+    for (int i = 0; i < 3; ++i)
+      EXPECT_NEAR(p(i, i), 2 * s[i] * w1 + 2 * s[i] * (s.squaredNorm() - s[i] * s[i]) * w2 + wl / s[i], 1e-12);
+    EXPECT_NEAR((p - Matrix3(p.diagonal().asDiagonal())).norm(), 0, 1e-13);
+  }
+}
+
+// F = 1 + γ e1 e2ᵀ: J = 1, I1 = I2 = 3 + γ²; Cauchy shear σ12 = 2 γ (W1 + W2) whatever the volumetric part, and
+// the universal relation of Rivlin σ11 - σ22 = γ σ12.
+TEST_P(WorkedLaw, SimpleShear) {
+  const double gamma = 0.6;
+  Matrix3 f = Matrix3::Identity();
+  f(0, 1) = gamma;
+  const auto [w1, w2, wl] = GetParam().slopes(mu, lambda, 3 + gamma * gamma, 0, 1);
+  const Matrix3 cauchy = stress(f) * f.transpose();
+  EXPECT_NEAR(cauchy(0, 1), 2 * gamma * (w1 + w2), 1e-13);
+  EXPECT_NEAR(cauchy(0, 0) - cauchy(1, 1), gamma * cauchy(0, 1), 1e-13);
+  EXPECT_GT(cauchy(0, 1), mu * gamma * 0.999);  // none softens in shear
+}
+
+double k_of(double i1, double log_j) { return i1 - 3 - 2 * log_j; }
+
+INSTANTIATE_TEST_SUITE_P(
+    Laws, WorkedLaw,
+    ::testing::Values(Worked{BulkLaw::neo_hookean,
+                             {},
+                             [](double mu, double lambda, double, double log_j, double) {
+                               return std::array{mu / 2, 0.0, -mu + lambda * log_j};
+                             }},
+                      Worked{BulkLaw::mooney_rivlin,
+                             {0.4, 0},
+                             [](double mu, double lambda, double, double log_j, double) {
+                               const double c10 = 0.3 * mu, c01 = 0.2 * mu;
+                               return std::array{c10, c01, -2 * c10 - 4 * c01 + (lambda - 4 * c01) * log_j};
+                             }},
+                      Worked{BulkLaw::yeoh,
+                             {0.8, 0.3},
+                             [](double mu, double lambda, double i1, double log_j, double) {
+                               const double k = k_of(i1, log_j);
+                               const double slope = mu / 2 * (1 + 2 * 0.8 * k + 3 * 0.3 * k * k);
+                               return std::array{slope, 0.0, -2 * slope + lambda * log_j};
+                             }},
+                      Worked{BulkLaw::gent,
+                             {2.5, 0},
+                             [](double mu, double lambda, double i1, double log_j, double) {
+                               const double slope = mu / 2 * 2.5 / (2.5 - k_of(i1, log_j));
+                               return std::array{slope, 0.0, -2 * slope + lambda * log_j};
+                             }},
+                      Worked{
+                          BulkLaw::neo_hookean_calculix, {}, [](double mu, double lambda, double i1, double, double j) {
+                            const double share = std::pow(j, -2.0 / 3), kappa = lambda + 2 * mu / 3;
+                            return std::array{mu / 2 * share, 0.0, -mu / 3 * share * i1 + kappa * j * (j - 1)};
+                          }}));
+
+// Uniaxial stress of the nearly incompressible solid: the textbook's σ = 2 (s² - 1/s) (W1 + W2/s).
+TEST(NearlyIncompressible, UniaxialStressIsTheTextbooks) {
+  const double s = 1.5, nu = 0.499999, i1 = s * s + 2 / s, mu = 0.5 / (2 * (1 + nu));
+  const auto cauchy_stress = [&](BulkLaw law, const std::array<double, 2>& shape) {
+    BulkMaterial<double> m = bulk_material<double>(0.5, nu, 0);
+    m.shape = shape;
+    double wide = 1 / std::sqrt(s);
+    for (int i = 0; i < 50; ++i) {  // secant on the lateral stress
+      const auto lateral = [&](double w) {
+        return bulk_stress<double>(law, Eigen::Vector3d(s, w, w).asDiagonal(), m, rest)(1, 1);
+      };
+      const double h = 1e-7;
+      wide -= lateral(wide) * h / (lateral(wide + h) - lateral(wide));
+    }
+    return bulk_stress<double>(law, Eigen::Vector3d(s, wide, wide).asDiagonal(), m, rest)(0, 0) / (wide * wide);
+  };
+  const double way = 2 * (s * s - 1 / s);
+  EXPECT_NEAR(cauchy_stress(BulkLaw::neo_hookean, {}), way * mu / 2, 1e-5);
+  EXPECT_NEAR(cauchy_stress(BulkLaw::neo_hookean_calculix, {}), way * mu / 2, 1e-5);
+  EXPECT_NEAR(cauchy_stress(BulkLaw::mooney_rivlin, {0.4, 0}), way * mu / 2 * (0.6 + 0.4 / s), 1e-5);
+  const double k = i1 - 3;
+  EXPECT_NEAR(cauchy_stress(BulkLaw::yeoh, {0.8, 0.3}), way * mu / 2 * (1 + 1.6 * k + 0.9 * k * k), 1e-5);
+  EXPECT_NEAR(cauchy_stress(BulkLaw::gent, {2.5, 0}), way * mu / 2 * 2.5 / (2.5 - k), 1e-5);
+}
+
+TEST(Gent, HasNoEnergyBeyondItsLimit) {
+  BulkMaterial<double> m = bulk_material<double>(0.5, 0.45, 0);
+  m.shape = {0.5, 0};
+  const auto margin = [&m](double s) {
+    return law_margin(BulkLaw::gent, InvariantStrain(Eigen::Vector3d(s, 1, 1).asDiagonal()), m);
+  };
+  EXPECT_EQ(margin(1), 1);
+  EXPECT_GT(margin(1.4), 0);  // K = 1.96 - 1 - 2 ln 1.4 = 0.287
+  EXPECT_LT(margin(1.7), 0);  // K = 2.89 - 1 - 2 ln 1.7 = 0.829
+  EXPECT_EQ(law_margin(BulkLaw::yeoh, InvariantStrain(Matrix3(3 * Matrix3::Identity())), m), 1);
+}
+
+TEST(SplitLambda, LeavesModerateTissueAloneAndIsSmooth) {
+  const auto excess = [](double over_mu) {
+    return split_lambda(BulkMaterial<double>{0.4, 0.4 * over_mu, 0, {}}).excess / 0.4;
+  };
+  EXPECT_EQ(excess(1), 0);
+  EXPECT_EQ(excess(pointwise_lambda_over_mu), 0);
+  EXPECT_NEAR(excess(pointwise_lambda_over_mu * (1 + 1e-4)), 0, 1e-6);  // of second order at the knee
+  EXPECT_GT(excess(500), 470);
+  const BulkMaterial<Dual> moving{Dual(0.4), Dual(8.0, 0), Dual(0.0), {}};
+  EXPECT_GT(taylor_order(
+                [](double h) {
+                  return split_lambda(BulkMaterial<double>{0.4, 8.0 + 40 * h, 0, {}}).excess;
+                },
+                40 * split_lambda(moving).excess.v[0]),
+            1.9);
 }
 
 }  // namespace

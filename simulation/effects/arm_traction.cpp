@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/arm_traction.h"
+
+#include "meshing/anatomy.h"
+#include "simulation/effects/bump.h"
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+namespace {
+
+const Eigen::Vector2d patch_centre(0.65, 0.65);  // q
+constexpr double patch_radius = 0.5;             // foot radii
+
+}  // namespace
+
+const std::vector<Parameter>& ArmTraction::parameters() const {
+  static const std::vector<Parameter> rows = {
+      {"lateral_kpa", "kPa", 0, -0.6, 0.6, 0, 0.15, false,
+       "traction toward the patient's outer side, middle of the patch"},
+      {"head_kpa", "kPa", 0, -0.6, 0.6, 0, 0.15, false, "traction toward the head, middle of the patch"}};
+  return rows;
+}
+
+void ArmTraction::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
+                        Fields<Dual>& fields) const {
+  if (scene.pose == "prone") return;
+  const FaceGroup& skin = scene.layout.skin;
+  for (Eigen::Index f = 0; f < skin.faces.size(); ++f) {
+    const double weight = bump(skin.q.row(f).transpose(), patch_centre, patch_radius);
+    if (weight == 0) continue;
+    for (int i = 0; i < 3; ++i)
+      fields.skin_traction[3 * f + i] +=
+          weight * (values[0] * scene.anatomy.lateral[i] + values[1] * scene.anatomy.head[i]);
+  }
+}
+
+}  // namespace supine::simulation

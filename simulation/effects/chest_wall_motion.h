@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "simulation/catalogue.h"
+
+namespace supine::simulation {
+
+/// The rigid muscle is somewhere else than in the image: under the mound it has come out along its normal by
+/// amplitude_mm in the middle of the foot, fading smoothly to nothing at the foot's mean radius. Every pose but prone.
+class ChestWallMotion : public Effect {
+ public:
+  std::string name() const override { return "chest_wall_motion"; }
+  std::string meaning() const override { return "chest wall that has another shape than in the scanner"; }
+  const std::vector<Parameter>& parameters() const override;
+  bool needs_other_pose() const override { return true; }
+  void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
+             Fields<Dual>& fields) const override;
+};
+
+}  // namespace supine::simulation

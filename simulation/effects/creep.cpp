@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/creep.h"
+
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+
+const std::vector<Parameter>& Creep::parameters() const {
+  static const std::vector<Parameter> rows = {
+      {"log_softening", "1", 0, 0, 0.36, 0.1, 0.7, true, "ln of the modulus in the other poses over the one in prone"}};
+  return rows;
+}
+
+void Creep::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
+                  Fields<Dual>& fields) const {
+  if (scene.pose != "prone") return;
+  for (Dual& e : fields.ln_young) e -= values[0];
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/friction.h"
+
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+
+const std::vector<Parameter>& Friction::parameters() const {
+  static const std::vector<Parameter> rows = {{"coefficient", "1", 0, 0, 0.6, 0.2, 0.7, true, "Coulomb's coefficient"}};
+  return rows;
+}
+
+void Friction::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
+                     Fields<Dual>& fields) const {
+  for (Dual& mu : fields.interface_friction) mu += values[0];
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/incompressibility.h"
+
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+
+const std::vector<Parameter>& Incompressibility::parameters() const {
+  static const std::vector<Parameter> rows = {
+      {"log_factor", "1", 0, -0.7, 4, 0, 0.5, false, "a of 0.5 - nu becoming (0.5 - nu) e^-a"}};
+  return rows;
+}
+
+void Incompressibility::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
+                              Fields<Dual>& fields) const {
+  // As a step toward 0.5, so that a = 0 leaves ν bit for bit.
+  const Dual share(-std::expm1(-values[0].a), std::exp(-values[0].a) * values[0].v);
+  for (Dual& nu : fields.poisson) nu += (0.5 - nu) * share;
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/skin_prestretch.h"
+
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+
+const std::vector<Parameter>& SkinPrestretch::parameters() const {
+  static const std::vector<Parameter> rows = {
+      {"excess", "1", 0, -0.08, 0.4, 0.1, 0.1, false, "stretch of the skin in the undeformed shape, less 1"}};
+  return rows;
+}
+
+void SkinPrestretch::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
+                           Fields<Dual>& fields) const {
+  for (Dual& stretch : fields.skin_prestretch) stretch += values[0];
+}
+
+}  // namespace supine::simulation

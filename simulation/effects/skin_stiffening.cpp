@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/skin_stiffening.h"
+
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+
+const std::vector<Parameter>& SkinStiffening::parameters() const {
+  static const std::vector<Parameter> rows = {{"exponent", "1", 0, 0, 6, 1, 0.7, true, "b of the exponential law"}};
+  return rows;
+}
+
+void SkinStiffening::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
+                           Fields<Dual>& fields) const {
+  for (Dual& b : fields.skin_stiffening) b += values[0];
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "simulation/krylov.h"
+#include "simulation/mechanics.h"
+#include "simulation/spd_solver.h"
+
+namespace supine::simulation {
+
+/// Newton steps for one Mechanics: solves ∂r/∂x s = -r or ∂r/∂X s = -r.
+///
+/// One factor of ∂r/∂x (or, on large meshes, one multigrid hierarchy) is kept and used as preconditioner for as long as
+/// Krylov iterations with it are cheaper than a new one. -∂r/∂X is close to ∂r/∂x (equal to first order for small
+/// strain), so the same factor serves the inverse solve, whose matrix is not symmetric and would cost three times as
+/// much to factorise.
+class NewtonDirection {
+ public:
+  explicit NewtonDirection(const Mechanics& mechanics);
+
+  /// Step for the deformed shape. @p sums holds residual and tangent at @p state; they are evaluated again with
+  /// Demand::convex where the tangent is not positive definite.
+  /// @param tolerance  of the linear solve, relative to |r|
+  /// @param moved_mm   how far the last step went: what says whether the kept factor is still close
+  /// @return false when no step was found
+  bool deformed(const State& state, double tolerance, double moved_mm, Sums& sums, Eigen::VectorXd& step);
+
+  /// Step for the undeformed shape. @p sums holds residual and reference tangent at @p state.
+  bool undeformed(const State& state, double tolerance, Sums& sums, Eigen::VectorXd& step);
+
+  /// Forgets the kept factor, so that what follows does not depend on what was solved before.
+  void forget() { have_factor_ = false; }
+
+  /// Whether the last step came from the exact tangent: its length then says how far the answer is.
+  bool exact() const { return exact_; }
+  int factorisations() const { return factorisations_; }
+
+ private:
+  bool factorise(const State& state, double tolerance, Sums& sums, Eigen::VectorXd* step);
+  bool by_conjugate_gradients(double tolerance, double shift, int most, const Sums& sums, Eigen::VectorXd& step);
+  bool by_gmres(const SparseMatrix& matrix, double sign, double tolerance, const Sums& sums, Eigen::VectorXd& step);
+
+  const Mechanics& mechanics_;
+  std::unique_ptr<SpdSolver> factor_;
+  Krylov krylov_;
+  bool have_factor_ = false;
+  bool outworn_ = false;  // the last Krylov solve cost more than a new factor would
+  bool exact_ = true;
+  int factorisations_ = 0;
+};
+
+}  // namespace supine::simulation
