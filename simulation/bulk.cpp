@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "common/error.h"
+#include "simulation/constant.h"
 #include "simulation/laws/invariant_kernel.h"
 #include "simulation/tet_geometry.h"
 
@@ -202,6 +203,9 @@ void BulkTerm<Element>::add_cell_derivative(int e, const State& state, const Cel
 template <class Element>
 void BulkTerm<Element>::add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const {
   add_elements<Element::nodes>(elements_, Demand{.residual = true}, sums, [this, &state, &fields](int e, auto& local) {
+    if (constant({fields.ln_young[e], fields.poisson[e], fields.stiffening[e], fields.law_shape_1[e],
+                  fields.law_shape_2[e], fields.fibre_modulus[e]}))
+      return;
     add_cell_derivative(e, state, cell_material(fields, e), local);
   });
 }

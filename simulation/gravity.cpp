@@ -54,7 +54,7 @@ void GravityTerm<Element>::add_parameter_derivative(const State& state, const Fi
   Points derivative(elements_.count(), 3);
   for (Eigen::Index e = 0; e < elements_.count(); ++e)
     for (int i = 0; i < 3; ++i) derivative(e, i) = (fields.density[e] * fields.gravity[i]).v[0];
-  add_force(state, derivative, Demand{.residual = true}, sums);
+  if ((derivative.array() != 0).any()) add_force(state, derivative, Demand{.residual = true}, sums);
   if (reference_ == DensityReference::undeformed) return;
   Points velocity(given_.rows(), 3);
   for (Eigen::Index i = 0; i < velocity.size(); ++i) velocity.data()[i] = fields.imaged_offset[i].v[0];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/interface.h"
 
+#include "simulation/constant.h"
 #include "simulation/surface_geometry.h"
 
 namespace supine::simulation {
@@ -98,6 +99,9 @@ void InterfaceTerm<Face>::add_parameter_derivative(const State& state, const Fie
     const NodeRows<n> nodes = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
     for (int p = 0; p < Face::points; ++p) {
       const int index = e * Face::points + p;
+      if (constant({fields.interface_normal[index], fields.interface_tangential[index],
+                    fields.interface_friction[index], fields.muscle_offset[index]}))
+        continue;
       const auto& value = Face::table().value[p];
       const Point point = point_at(index, nodes.transpose() * value, rest.transpose() * value);
       const auto force = contact_force(point.place, contact_material(fields, index, state.load));

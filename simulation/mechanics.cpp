@@ -16,18 +16,21 @@ namespace {
 
 Indices rows_of(const Indices& table, const Eigen::VectorXi& rows) { return table(rows, Eigen::all); }
 
+template <class Face>
+using MembraneFace = std::conditional_t<Face::nodes == 3, Tri3Centroid, Face>;
+
 template <class Cell, class Face>
 std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy,
                                               const Model& model, const Layout& layout, const Pattern& pattern) {
   std::vector<std::unique_ptr<Term>> terms;
-  terms.push_back(std::make_unique<BulkTerm<Cell>>(mesh.cells, pattern,
-                                                   BulkSettings{model.breast.law, model.breast.volumetric}));
+  terms.push_back(
+      std::make_unique<BulkTerm<Cell>>(mesh.cells, pattern, BulkSettings{model.breast.law, model.breast.volumetric}));
   terms.push_back(std::make_unique<FibreTerm<Cell>>(mesh.cells, pattern, anatomy.muscle));
   terms.push_back(
       std::make_unique<GravityTerm<Cell>>(mesh.cells, pattern, mesh.points, model.breast.density_refers_to));
   if (model.skin.young_modulus_kpa.value > 0)
-    terms.push_back(std::make_unique<SkinTerm<Face>>(rows_of(mesh.faces, layout.skin.faces), pattern,
-                                                     SkinSettings{model.skin.law, model.skin.compression}));
+    terms.push_back(std::make_unique<SkinTerm<MembraneFace<Face>>>(
+        rows_of(mesh.faces, layout.skin.faces), pattern, SkinSettings{model.skin.law, model.skin.compression}));
   terms.push_back(std::make_unique<TractionTerm<Face>>(rows_of(mesh.faces, layout.skin.faces), pattern));
   if (model.interface.kind == InterfaceKind::sliding)
     terms.push_back(

@@ -5,6 +5,8 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "simulation/constant.h"
+
 namespace supine::simulation {
 namespace {
 
@@ -76,16 +78,18 @@ Eigen::Matrix<double, N, N> convex_part(const Eigen::Matrix<double, N, N>& m) {
 struct MembraneTangent {
   double energy = 0;
   Metric<double> stress;
-  Eigen::Matrix3d by_g, by_rest;  // ∂T/∂g and ∂T/∂G
+  Eigen::Matrix3d by_g, by_rest;  // ∂T/∂g, and ∂T/∂G where it is wanted
 };
 
+/// @tparam Variables  3: derivatives with respect to g alone, 6: to G as well
+template <int Variables>
 MembraneTangent membrane_tangent(const SkinSettings& settings, const SkinMaterial<double>& material,
                                  const Metric<double>& g, const Metric<double>& rest) {
-  using Jet = ceres::Jet<double, 6>;
+  using Jet = ceres::Jet<double, Variables>;
   Metric<Jet> gj, rest_j;
   for (int i = 0; i < 3; ++i) {
     gj[i] = Jet(g[i], i);
-    rest_j[i] = Jet(rest[i], 3 + i);
+    rest_j[i] = Variables == 6 ? Jet(rest[i], 3 + i) : Jet(rest[i]);
   }
   const auto point = membrane_point<Jet>(settings, material, gj, rest_j);
   MembraneTangent result;
@@ -93,7 +97,7 @@ MembraneTangent membrane_tangent(const SkinSettings& settings, const SkinMateria
   for (int i = 0; i < 3; ++i) {
     result.stress[i] = point.stress[i].a;
     result.by_g.row(i) = point.stress[i].v.template head<3>().transpose();
-    result.by_rest.row(i) = point.stress[i].v.template tail<3>().transpose();
+    if (Variables == 6) result.by_rest.row(i) = point.stress[i].v.template tail<3>().transpose();
   }
   return result;
 }
@@ -116,7 +120,9 @@ void add_membrane_tangent(const MembraneTangent& point, const Eigen::Matrix<doub
   const Eigen::Matrix<double, N, N> geometric = weight * gradient * stress * gradient.transpose();
   for (int a = 0; a < N; ++a) {
     const Eigen::Matrix3d left = weight * metric_derivative<N>(gradient, a, now).transpose();
-    const Eigen::Matrix3d to_x = left * material, to_rest = left * (half * point.by_rest);
+    const Eigen::Matrix3d to_x = left * material;
+    Eigen::Matrix3d to_rest;
+    if (demand.reference_tangent) to_rest = left * (half * point.by_rest);
     for (int b = 0; b < N; ++b) {
       auto block = local.tangent.template block<3, 3>(3 * a, 3 * b);
       block.noalias() += to_x * metric_derivative<N>(gradient, b, now);
@@ -135,6 +141,11 @@ SkinMaterial<T> skin_material(const Fields<T>& fields, Eigen::Index e) {
 }
 
 }  // namespace
+
+const ShapeTable<3, 2, 1>& Tri3Centroid::table() {
+  static const ShapeTable<3, 2, 1> table = {{Eigen::Vector3d::Constant(1.0 / 3)}, {Tri3::table().gradient[0]}, {0.5}};
+  return table;
+}
 
 template <class Face>
 SkinTerm<Face>::SkinTerm(const Indices& faces, const Pattern& pattern, const SkinSettings& settings)
@@ -156,7 +167,8 @@ void SkinTerm<Face>::add_face(int e, const State& state, const Demand& demand, L
     const Eigen::Matrix<double, 3, 2> now = x.transpose() * gradient, before = rest.transpose() * gradient;
     MembraneTangent point;
     if (demand.tangent || demand.reference_tangent) {
-      point = membrane_tangent(settings_, material_[e], metric(now), metric(before));
+      point = demand.reference_tangent ? membrane_tangent<6>(settings_, material_[e], metric(now), metric(before))
+                                       : membrane_tangent<3>(settings_, material_[e], metric(now), metric(before));
       add_membrane_tangent<n>(point, gradient, weight, now, before, demand, local);
     } else {
       const auto plain = membrane_point<double>(settings_, material_[e], metric(now), metric(before));
@@ -179,6 +191,9 @@ template <class Face>
 void SkinTerm<Face>::add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const {
   constexpr int n = Face::nodes;
   add_elements<n>(elements_, Demand{.residual = true}, sums, [this, &state, &fields](int e, auto& local) {
+    if (constant({fields.skin_modulus[e], fields.skin_poisson[e], fields.skin_compression[e], fields.skin_prestretch[e],
+                  fields.skin_stiffening[e]}))
+      return;
     const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
     for (int p = 0; p < Face::points; ++p) {
       const auto& gradient = Face::table().gradient[p];
@@ -192,7 +207,7 @@ void SkinTerm<Face>::add_parameter_derivative(const State& state, const Fields<D
   });
 }
 
-template class SkinTerm<Tri3>;
+template class SkinTerm<Tri3Centroid>;
 template class SkinTerm<Tri6>;
 
 }  // namespace supine::simulation

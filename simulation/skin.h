@@ -7,10 +7,16 @@
 
 namespace supine::simulation {
 
+/// Linear triangle with its centroid alone: exact for a membrane, whose strain does not vary over such a face.
+struct Tri3Centroid {
+  static constexpr int nodes = 3, points = 1;
+  static const ShapeTable<3, 2, 1>& table();
+};
+
 /// Massless elastic membrane on the skin faces, without bending stiffness: energy ∫ E h ψ(Cs) dA over the undeformed
 /// area, Cs the in-plane Cauchy-Green tensor times prestretch². With metrics G (undeformed) and g (deformed) of the
 /// parent coordinates, λ1² + λ2² = tr(G⁻¹ g) and λ1² λ2² = det g / det G, so that x and X play alike roles.
-/// @tparam Face  Tri3 or Tri6
+/// @tparam Face  Tri3Centroid or Tri6
 template <class Face>
 class SkinTerm : public Term {
  public:
@@ -28,7 +34,7 @@ class SkinTerm : public Term {
   std::vector<SkinMaterial<double>> material_;  // per face
 };
 
-extern template class SkinTerm<Tri3>;
+extern template class SkinTerm<Tri3Centroid>;
 extern template class SkinTerm<Tri6>;
 
 }  // namespace supine::simulation

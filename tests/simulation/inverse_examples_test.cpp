@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "simulation/equilibrium.h"
+#include "simulation/linear_solver.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/shapes.h"
 
@@ -42,9 +43,12 @@ testing::TestScene quadratic_scene(testing::TestScene scene) {
   return scene;
 }
 
-/// The published block: 2 m cube, base held, μ 25 kPa, λ 800 kPa, 1000 kg/m³; its energy is that of neo_hookean.
+/// The published block: 2 m cube, base held, μ 25 kPa, λ 800 kPa, 1000 kg/m³; its energy is that of neo_hookean. Solved
+/// in 1:20 with moduli 1:20, which is the same problem (ObjectivityTest.UnitOfLengthScalesTheAnswer), as the engine's
+/// longest Newton step is made for breasts.
+constexpr double block_scale = 0.05;
 testing::TestScene sagging_block(int n) {
-  return quadratic_scene(testing::box_scene(n, Eigen::Vector3d::Constant(2000)));
+  return quadratic_scene(testing::box_scene(n, Eigen::Vector3d::Constant(2000 * block_scale)));
 }
 
 /// The published beam: a cylinder 182 mm long of radius 4.25 mm, one end held, gravity across. A box drawn round, its
@@ -69,50 +73,86 @@ Model beam_model() {
   return model;
 }
 
+/// How the equations are solved: by the engine's own solver, or as published by Newton's method without line search in
+/// equal load steps (10 there, 30 here, each begun on the line through the last two). The thin, nearly incompressible
+/// beam needs the latter: every useful step first makes the residual and the energy larger, which a line search on them
+/// does not allow.
+enum class Way { engine, plain_newton };
+
+void plain_newton(const Mechanics& mechanics, const Points& known, Points& sought, bool inverse) {
+  constexpr int load_steps = 30;
+  Sums sums(mechanics.pattern());
+  LuSolver solver(inverse ? sums.reference_tangent : sums.tangent);
+  const Demand demand{.residual = true, .tangent = !inverse, .reference_tangent = inverse};
+  sought = known;
+  Points before = known;
+  for (int step = 1; step <= load_steps; ++step) {
+    const Points extrapolated = 2 * sought - before;
+    before = sought;
+    sought = extrapolated;
+    double moved = 1;
+    for (int iteration = 0; iteration < 30 && moved > 1e-9; ++iteration) {
+      const double load = static_cast<double>(step) / load_steps;
+      mechanics.evaluate(inverse ? State{known, sought, load} : State{sought, known, load}, demand, sums);
+      ASSERT_TRUE(sums.valid && solver.factorise(inverse ? sums.reference_tangent : sums.tangent)) << "step " << step;
+      const Eigen::VectorXd move = solver.solve(sums.residual);
+      Eigen::Map<Eigen::VectorXd>(sought.data(), sought.size()) -= move;
+      moved = move.cwiseAbs().maxCoeff();
+    }
+    ASSERT_LE(moved, 1e-9) << "step " << step << " did not converge";
+  }
+}
+
 Points solve(const testing::TestScene& scene, const Model& model, const Eigen::Vector3d& gravity, const Points& known,
-             bool inverse) {
+             bool inverse, Way way) {
   Mechanics mechanics(scene.mesh, scene.anatomy, model);
   mechanics.set_fields(
       values_of(make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics.layout(), "prone"}, gravity)));
-  EquilibriumSolver solver(mechanics);
   Points sought;
+  if (way == Way::plain_newton) {
+    plain_newton(mechanics, known, sought, inverse);
+    return sought;
+  }
+  EquilibriumSolver solver(mechanics);
   inverse ? solver.inverse(known, sought, "inverse") : solver.forward(known, sought, "forward");
   return sought;
 }
 
-/// Mean absolute error of the coordinates, metres, as published.
-double mean_error_m(const Points& a, const Points& b) { return (a - b).cwiseAbs().mean() / 1000; }
-
 struct Errors {
-  double there_and_back_m;  ///< X → x → X with all nodes
-  double corners_m;         ///< X → x → X where x keeps its corners only and gets straight edges, as published
+  double there_and_back_m;    ///< X → x → X with all nodes: mean absolute error of the coordinates
+  double corners_m;           ///< X → x → X where x keeps its corners only and gets straight edges, as published
+  double corners_squared_m2;  ///< mean square of the same: what the published program computes
   double sag_m;
 };
 
 /// @param corners  number of corner nodes, which come first
+/// @param scale    of the model; errors are at full size
 Errors there_and_back(const testing::TestScene& scene, const Model& model, const Eigen::Vector3d& gravity,
-                      Eigen::Index corners) {
+                      Eigen::Index corners, double scale, Way way) {
   const Points& X = scene.mesh.points;
-  const Points x = solve(scene, model, gravity, X, false);
-  const Points back = solve(scene, model, gravity, x, true);
+  const Points x = solve(scene, model, gravity, X, false, way);
+  const Points back = solve(scene, model, gravity, x, true, way);
   testing::TestScene linear = scene;
   linear.mesh.points = x.topRows(corners);
   linear.mesh.cells = scene.mesh.cells.leftCols(4).eval();
   linear.mesh.faces = scene.mesh.faces.leftCols(3).eval();
   const testing::TestScene straight = quadratic_scene(linear);
-  const Points from_corners = solve(straight, model, gravity, straight.mesh.points, true);
-  return {mean_error_m(back, X), mean_error_m(from_corners.topRows(corners), X.topRows(corners)),
-          (x - X).rowwise().norm().maxCoeff() / 1000};
+  const Points from_corners = solve(straight, model, gravity, straight.mesh.points, true, way);
+  const double metres = 1e-3 / scale;
+  const Points off = metres * (from_corners.topRows(corners) - X.topRows(corners));
+  return {metres * (back - X).cwiseAbs().mean(), off.cwiseAbs().mean(), off.array().square().mean(),
+          metres * (x - X).rowwise().norm().maxCoeff()};
 }
 
 Errors block_errors(int n) {
-  const Model model = held_model(BulkLaw::neo_hookean, Elastic::from_lame(25, 800), 1000);
-  return there_and_back(sagging_block(n), model, -Eigen::Vector3d::UnitZ(), (n + 1) * (n + 1) * (n + 1));
+  const Elastic elastic = Elastic::from_lame(25 * block_scale, 800 * block_scale);
+  return there_and_back(sagging_block(n), held_model(BulkLaw::neo_hookean, elastic, 1000), -Eigen::Vector3d::UnitZ(),
+                        (n + 1) * (n + 1) * (n + 1), block_scale, Way::engine);
 }
 
 Errors beam_errors(int across, int along) {
   return there_and_back(beam(across, along), beam_model(), -Eigen::Vector3d::UnitY(),
-                        (across + 1) * (across + 1) * (along + 1));
+                        (across + 1) * (across + 1) * (along + 1), 1, Way::plain_newton);
 }
 
 constexpr double published_m = 1e-6;
@@ -144,9 +184,11 @@ TEST(InverseExamples, BeamReturns) {
 // The table of docs/verification.md: test_verification --gtest_also_run_disabled_tests --gtest_filter=*Table*
 TEST(InverseExamples, DISABLED_Table) {
   fmt::print(
-      "| example | tetrahedra | largest displacement m | all nodes, m | corners only, m |\n|---|---|---|---|---|\n");
+      "| example | tetrahedra | largest displacement m | all nodes, m | corners only, m | the same, mean square, m² "
+      "|\n|---|---|---|---|---|---|\n");
   const auto line = [](const char* name, int tetrahedra, const Errors& e) {
-    fmt::print("| {} | {} | {:.4f} | {:.1e} | {:.1e} |\n", name, tetrahedra, e.sag_m, e.there_and_back_m, e.corners_m);
+    fmt::print("| {} | {} | {:.4f} | {:.1e} | {:.1e} | {:.1e} |\n", name, tetrahedra, e.sag_m, e.there_and_back_m,
+               e.corners_m, e.corners_squared_m2);
   };
   for (const int n : {1, 2, 4, 6, 8}) line("block", 6 * n * n * n, block_errors(n));
   for (const auto& [across, along] : {std::pair{2, 24}, {2, 48}, {4, 48}})
