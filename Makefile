@@ -2,8 +2,11 @@
 #
 #   make demo                        install what is missing, build, run the sample case, print what came out
 #   make test                        the same set-up, then every test
-#   make CASE=dir [OUT=dir] [stage]  run a case: segment reconstruct decimate mesh simulate compare, or as far as its data allow
+#   make CASE=dir [OUT=dir] [stage]  run a case: segment reconstruct decimate mesh simulate compare, or as far as its data allow;
+#                                    then calibrate, diagnose
 #   make build                       only build, into $(BUILD)
+#   make bench [DATA=dir]            every measurement of docs/verification.md and docs/performance.md: hours, on a quiet machine
+#   make study [DATA=dir]            every table of docs/study.md: an hour or more, on a quiet machine
 
 SHELL := /bin/bash
 BUILD ?= build
@@ -11,10 +14,12 @@ CONFIG ?= Release
 # One compiler per core, as far as 1.5 GB of free memory for each allow: heavy templates.
 JOBS ?= $(shell awk -v cores=$$(nproc) '/^MemAvailable/ { m = int($$2 / 1572864); n = m < cores ? m : cores; print n < 1 ? 1 : n }' /proc/meminfo)
 
-stages := segment reconstruct decimate mesh simulate compare summary
+stages := segment reconstruct decimate mesh simulate compare calibrate diagnose summary
 run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 
-.PHONY: demo test build setup clean help case $(stages)
+DATA ?= ../shared/data
+
+.PHONY: bench study demo test build setup clean help case $(stages)
 
 ifdef CASE
 case: build
@@ -23,7 +28,7 @@ $(stages): build
 	$(run_case) $@
 else
 help:
-	@sed -n '3,7s/^#//p' Makefile
+	@sed -n '3,10s/^#//p' Makefile
 $(stages):
 	@echo "Which case? make CASE=dir $@" >&2; exit 2
 endif
@@ -43,6 +48,12 @@ demo: build
 
 test: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel 2
+
+study: build
+	@bench/study.sh $(DATA)/hidden-open $(BUILD)/study $(BUILD)/bin
+
+bench: build
+	@bench/run_all.sh $(DATA) $(BUILD)/bench $(BUILD)/bin
 
 clean:
 	rm -rf $(BUILD)

@@ -1,124 +1,109 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
-// Two stages on the half ellipsoid that SOFA and CalculiX were run on (docs/verification.md): gravity along -z on the
-// meshed shape, then again with the shape of stage 1 taken as stress-free. Prints the tip's displacement and the time.
-//
-//   half_ellipsoid breast_3k.vtk breast_3k_skin.vtk [young_kpa] [neo_hookean|corotational|corotational_qr] [skin_kpa]
+// Gravity along -z on the half ellipsoid that SOFA and CalculiX were run on (docs/verification.md), stage 2 with the
+// shape of stage 1 taken as stress-free; or the round trip prone → undeformed → prone by one of the inverses.
 
 #include <fmt/format.h>
-#include <vtkCell.h>
-#include <vtkDataSet.h>
-#include <vtkGenericDataObjectReader.h>
-#include <vtkNew.h>
-#include <vtkSmartPointer.h>
+#include <fmt/os.h>
 
+#include <CLI/CLI.hpp>
 #include <chrono>
-#include <cstdlib>
 #include <iostream>
-#include <map>
-#include <set>
 
+#include "bench/ellipsoid.h"
 #include "common/error.h"
-#include "simulation/equilibrium.h"
+#include "simulation/bulk_laws.h"
+#include "simulation/chain.h"
 
 namespace {
 
 using namespace supine;
-using reconstruction::Region;
 
-vtkSmartPointer<vtkDataSet> read(const char* file) {
-  vtkNew<vtkGenericDataObjectReader> reader;
-  reader->SetFileName(file);
-  reader->Update();
-  vtkSmartPointer<vtkDataSet> data = vtkDataSet::SafeDownCast(reader->GetOutput());
-  if (!data) throw InputError(std::string(file) + " is not a VTK mesh");
-  return data;
+struct Arguments {
+  std::string mesh, skin_file, law = "neo_hookean", compression = "full", nodes, round_trip;
+  double young_kpa = 1, skin_kpa = 22.7;
+  int stages = 2, order = 1;
+};
+
+double seconds() {
+  static const auto start = std::chrono::steady_clock::now();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// Metres in the files, mm here.
-meshing::TetMesh read_mesh(const char* tets, const char* skin) {
-  const auto volume = read(tets);
-  const auto surface = read(skin);
-  meshing::TetMesh mesh;
-  mesh.points.resize(volume->GetNumberOfPoints(), 3);
-  for (vtkIdType p = 0; p < volume->GetNumberOfPoints(); ++p) {
-    volume->GetPoint(p, mesh.points.row(p).data());
-    mesh.points.row(p) *= 1000;
-  }
-  std::vector<std::array<int, 4>> cells;
-  for (vtkIdType c = 0; c < volume->GetNumberOfCells(); ++c)
-    if (vtkCell* cell = volume->GetCell(c); cell->GetCellType() == VTK_TETRA)
-      cells.push_back(
-          {int(cell->GetPointId(0)), int(cell->GetPointId(1)), int(cell->GetPointId(2)), int(cell->GetPointId(3))});
-  mesh.cells.resize(cells.size(), 4);
-  for (std::size_t c = 0; c < cells.size(); ++c)
-    for (int a = 0; a < 4; ++a) mesh.cells(c, a) = cells[c][a];
-  std::set<std::array<int, 3>> on_skin;
-  std::vector<std::array<int, 3>> faces;
-  for (vtkIdType f = 0; f < surface->GetNumberOfCells(); ++f)
-    if (vtkCell* face = surface->GetCell(f); face->GetCellType() == VTK_TRIANGLE)
-      faces.push_back({int(face->GetPointId(0)), int(face->GetPointId(1)), int(face->GetPointId(2))});
-  const std::size_t skin_faces = faces.size();
-  for (const auto& cell : cells)
-    for (int skip = 0; skip < 4; ++skip) {
-      std::array<int, 3> face;
-      for (int a = 0, i = 0; a < 4; ++a)
-        if (a != skip) face[i++] = cell[a];
-      if (std::all_of(face.begin(), face.end(), [&](int n) { return std::abs(mesh.points(n, 2)) < 1e-6; }))
-        faces.push_back(face);
-    }
-  mesh.faces.resize(faces.size(), 3);
-  mesh.region.resize(faces.size());
-  for (std::size_t f = 0; f < faces.size(); ++f) {
-    for (int a = 0; a < 3; ++a) mesh.faces(f, a) = faces[f][a];
-    mesh.region[f] = static_cast<int>(f < skin_faces ? Region::skin : Region::inner);
-  }
-  return mesh;
+simulation::Model model_of(const Arguments& arguments) {
+  for (const auto& [name, law] : simulation::bulk_law_names())
+    if (name == arguments.law)
+      return bench::ellipsoid_model(
+          law, arguments.young_kpa, arguments.skin_kpa,
+          arguments.compression == "full" ? simulation::Compression::full : simulation::Compression::tension_field);
+  throw InputError("unknown law " + arguments.law);
 }
 
-simulation::Model make_model(int argc, char** argv) {
-  using simulation::BulkLaw;
-  static const std::map<std::string, BulkLaw> laws = {{"neo_hookean", BulkLaw::neo_hookean},
-                                                      {"corotational", BulkLaw::corotational},
-                                                      {"corotational_qr", BulkLaw::corotational_qr}};
-  simulation::Model model;
-  model.breast.young_modulus_kpa.value = argc > 3 ? std::atof(argv[3]) : 1.0;
-  model.breast.law = argc > 4 ? laws.at(argv[4]) : BulkLaw::neo_hookean;
-  model.breast.density_refers_to = simulation::DensityReference::undeformed;
-  model.skin.young_modulus_kpa.value = argc > 5 ? std::atof(argv[5]) : 22.7;
-  model.skin.law = simulation::SkinLaw::corotational;
-  model.skin.compression = argc > 6 ? simulation::Compression::tension_field : simulation::Compression::full;
-  model.interface.kind = simulation::InterfaceKind::fixed;
-  return model;
-}
-
-}  // namespace
-
-int main(int argc, char** argv) try {
-  if (argc < 3) throw InputError("usage: half_ellipsoid TETS SKIN [young_kpa] [law] [skin_kpa] [tension_field]");
-  const auto start = std::chrono::steady_clock::now();
-  meshing::TetMesh mesh = read_mesh(argv[1], argv[2]);
-  const auto tip = mesh.points.row(0).eval();
-  const auto elapsed = [&start] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  };
-  std::cout << fmt::format("read {:.3f} s, {} nodes, {} tetrahedra\n", elapsed(), mesh.points.rows(),
-                           mesh.cells.rows());
-  for (int stage = 1; stage <= 2; ++stage) {
-    const simulation::Model model = make_model(argc, argv);
-    meshing::Anatomy anatomy;
-    anatomy.q.setZero(mesh.points.rows(), 2);
+void run_stages(const Arguments& arguments, meshing::TetMesh mesh) {
+  const Points start = mesh.points;
+  std::string rows = "stage,node,ux_mm,uy_mm,uz_mm\n";
+  for (int stage = 1; stage <= arguments.stages; ++stage) {
+    const simulation::Model model = model_of(arguments);
+    const meshing::Anatomy anatomy = bench::ellipsoid_anatomy(mesh);
     simulation::Mechanics mechanics(mesh, anatomy, model);
     mechanics.set_fields(simulation::values_of(
         simulation::make_fields(model, {mesh, anatomy, mechanics.layout(), "prone"}, -Eigen::Vector3d::UnitZ())));
     simulation::EquilibriumSolver solver(mechanics);
     Points x;
     const auto report = solver.forward(mesh.points, x, fmt::format("stage {}", stage));
+    std::cout << fmt::format(
+        "stage {}: tip u_z {:.4f} mm, total {:.4f}, {} Newton, {} factorisations, {} load steps, min det F {:.3f}, at "
+        "{:.3f} s\n",
+        stage, x(0, 2) - mesh.points(0, 2), x(0, 2) - start(0, 2), report.newton_iterations, report.factorisations,
+        report.load_steps, report.min_det_f, seconds());
     mesh.points = x;
-    std::cout << fmt::format("stage {}: tip u_z {:.3f} mm, {} Newton, {} load steps, min det F {:.3f}, at {:.3f} s\n",
-                             stage, x(0, 2) - tip.z(), report.newton_iterations, report.load_steps, report.min_det_f,
-                             elapsed());
+    if (arguments.nodes.empty()) continue;
+    const Points moved = x - start;
+    for (Eigen::Index n = 0; n < moved.rows(); ++n)
+      rows += fmt::format("{},{},{:.12g},{:.12g},{:.12g}\n", stage, n, moved(n, 0), moved(n, 1), moved(n, 2));
   }
+  if (!arguments.nodes.empty()) fmt::output_file(arguments.nodes).print("{}", rows);
+}
+
+void run_round_trip(const Arguments& arguments, const meshing::TetMesh& mesh) {
+  using simulation::InverseMethod;
+  static const std::map<std::string, InverseMethod> methods = {{"newton", InverseMethod::newton},
+                                                               {"fixed-point", InverseMethod::fixed_point},
+                                                               {"reversed-gravity", InverseMethod::reversed_gravity}};
+  const Eigen::Vector3d down = -Eigen::Vector3d::UnitZ();
+  const auto solution = simulation::solve_chain(mesh, bench::ellipsoid_anatomy(mesh), model_of(arguments),
+                                                {{"prone", -down}, {"supine", down}}, methods.at(arguments.round_trip));
+  const auto sag = (solution.X - mesh.points).rowwise().norm().maxCoeff();
+  std::cout << fmt::format(
+      "{}: {} Newton, undeformed {:.3f} mm away at most, round trip {:.3g} mm max, {:.3g} rms, supine tip {:.3f} mm, "
+      "at "
+      "{:.3f} s\n",
+      arguments.round_trip, solution.inverse.newton_iterations, sag, solution.round_trip_max_mm,
+      solution.round_trip_rms_mm, solution.poses[0].x(0, 2) - mesh.points(0, 2), seconds());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  seconds();
+  Arguments arguments;
+  CLI::App app("The half ellipsoid of docs/verification.md");
+  app.add_option("mesh", arguments.mesh, "breast_3k.vtk, …: tetrahedra, metres")->required();
+  app.add_option("skin", arguments.skin_file, "ignored: the skin is every face off the base");
+  app.add_option("young_kpa", arguments.young_kpa, "Young's modulus of the breast, kPa");
+  app.add_option("law", arguments.law, "breast.law of model.toml");
+  app.add_option("skin_kpa", arguments.skin_kpa, "Young's modulus of the skin, kPa; 0 = none");
+  app.add_option("compression", arguments.compression)->check(CLI::IsMember({"full", "tension_field"}));
+  app.add_option("--stages", arguments.stages)->check(CLI::Range(1, 2));
+  app.add_option("--order", arguments.order)->check(CLI::Range(1, 2));
+  app.add_option("--nodes", arguments.nodes, "write the total displacement of every node after each stage, CSV");
+  app.add_option("--round-trip", arguments.round_trip, "prone → undeformed → prone by this inverse, in place of stages")
+      ->check(CLI::IsMember({"newton", "fixed-point", "reversed-gravity"}));
+  CLI11_PARSE(app, argc, argv);
+  const meshing::TetMesh mesh = bench::read_ellipsoid(arguments.mesh, arguments.order);
+  std::cout << fmt::format("read {:.3f} s, {} nodes, {} tetrahedra\n", seconds(), mesh.points.rows(),
+                           mesh.cells.rows());
+  arguments.round_trip.empty() ? run_stages(arguments, mesh) : run_round_trip(arguments, mesh);
   return 0;
 } catch (const supine::Error& error) {
   std::cerr << error.what() << "\n";

@@ -33,7 +33,7 @@ struct Piece {
   double area_mm2;
 };
 
-// Cuts face f into equal triangles no longer than sample_mm.
+// Cuts face f into triangles of equal corners' area no longer than sample_mm.
 void cut_face(const TetMesh& mesh, Eigen::Index f, std::vector<Piece>& pieces) {
   const Eigen::RowVector3d a = mesh.points.row(mesh.faces(f, 0));
   const Eigen::RowVector3d u = mesh.points.row(mesh.faces(f, 1)) - a, v = mesh.points.row(mesh.faces(f, 2)) - a;
@@ -41,8 +41,11 @@ void cut_face(const TetMesh& mesh, Eigen::Index f, std::vector<Piece>& pieces) {
   const double area = u.cross(v).norm() / 2 / (n * n);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; i + j < n; ++j) {
-      pieces.push_back({(a + (i + 1.0 / 3) / n * u + (j + 1.0 / 3) / n * v).transpose(), area});
-      if (i + j + 1 < n) pieces.push_back({(a + (i + 2.0 / 3) / n * u + (j + 2.0 / 3) / n * v).transpose(), area});
+      const auto add = [&](double s, double t) {
+        pieces.push_back({face_point(mesh.points, mesh.faces, f, s / n, t / n).transpose(), area});
+      };
+      add(i + 1.0 / 3, j + 1.0 / 3);
+      if (i + j + 1 < n) add(i + 2.0 / 3, j + 2.0 / 3);
     }
   }
 }

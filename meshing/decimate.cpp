@@ -3,188 +3,77 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <map>
-#include <numbers>
+#include <vector>
 
 #include "common/error.h"
-#include "meshing/remesh.h"
+#include "meshing/decimate_methods.h"
 #include "reconstruction/mesh_edges.h"
 #include "reconstruction/surface_check.h"
-#include "reconstruction/surface_tree.h"
 
 namespace supine::meshing {
 namespace {
 
-using reconstruction::MeshEdge;
 using reconstruction::Surface;
-using reconstruction::SurfaceReport;
-using reconstruction::SurfaceTree;
 
-constexpr int most_levels = 3;       // edges down to 1/8 of the coarsest
-constexpr double start_share = 0.2;  // edges of what is remeshed again and again, of the coarsest
-constexpr int most_tries = 16;
-constexpr double bound_share = 0.9;  // places nearer to the bound than this are refined
+constexpr double smallest_relative = 0.05, largest_relative = 20;
 
-struct Input {
-  const Surface& surface;
-  SurfaceReport report;
-  SurfaceTree tree;
-  Surface start;  // what is remeshed: the input, or nearly so where that has many more triangles than needed
-};
-
-Points samples_of(const Surface& surface) {
-  const std::vector<MeshEdge> edges = reconstruction::mesh_edges(surface.triangles);
-  const Eigen::Index points = surface.points.rows(), middles = static_cast<Eigen::Index>(edges.size());
-  Points samples(points + middles + surface.triangles.rows(), 3);
-  samples.topRows(points) = surface.points;
-  for (Eigen::Index e = 0; e < middles; ++e)
-    samples.row(points + e) = 0.5 * (surface.points.row(edges[e].points[0]) + surface.points.row(edges[e].points[1]));
-  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t)
-    samples.row(points + middles + t) =
-        (surface.points.row(surface.triangles(t, 0)) + surface.points.row(surface.triangles(t, 1)) +
-         surface.points.row(surface.triangles(t, 2))) /
-        3;
-  return samples;
+bool coarse_enough(const DecimateMeasure& measure, const DecimateOptions& options) {
+  if (options.edge_mm > 0) return false;
+  const Eigen::Index most = options.target_faces > 0 ? options.target_faces : options.target_triangles;
+  return measure.report().triangles <= most;
 }
 
-std::vector<MeshEdge> region_borders(const Surface& surface) {
-  std::vector<MeshEdge> edges = reconstruction::mesh_edges(surface.triangles);
-  if (surface.region.size() == 0) return {};
-  std::erase_if(edges, [&surface](const MeshEdge& edge) {
-    return edge.count == 2 && surface.region(edge.triangles[0]) == surface.region(edge.triangles[1]);
-  });
-  return edges;
-}
-
-// Distance of samples on the output's region borders from those of the input. Searched one by one: they are few.
-double border_distance_mm(const Surface& in, const Surface& out, double bound_mm,
-                          std::vector<Eigen::Vector3d>& places) {
-  const std::vector<MeshEdge> from = region_borders(out), to = region_borders(in);
-  if (from.empty() || to.empty()) return 0;
-  double largest = 0;
-  for (const MeshEdge& edge : from) {
-    const Eigen::RowVector3d ends[2] = {out.points.row(edge.points[0]), out.points.row(edge.points[1])};
-    for (const Eigen::RowVector3d& at : {ends[0], Eigen::RowVector3d(0.5 * (ends[0] + ends[1]))}) {
-      double nearest = 1e300;
-      for (const MeshEdge& segment : to) {
-        const Eigen::RowVector3d a = in.points.row(segment.points[0]), along = in.points.row(segment.points[1]) - a;
-        const double share = std::clamp((at - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
-        nearest = std::min(nearest, (a + share * along - at).squaredNorm());
-      }
-      if (nearest > bound_mm * bound_mm) places.emplace_back(at.transpose());
-      largest = std::max(largest, nearest);
-    }
-  }
-  return std::sqrt(largest);
-}
-
-void measure_shape(DecimateResult& result) {
-  const Surface& s = result.surface;
-  const auto edges = reconstruction::mesh_edges(s.triangles);
-  double sum = 0;
-  for (const MeshEdge& edge : edges) sum += (s.points.row(edge.points[0]) - s.points.row(edge.points[1])).norm();
-  result.edge_mm = sum / static_cast<double>(edges.size());
-  result.smallest_angle_deg = 180;
-  for (Eigen::Index t = 0; t < s.triangles.rows(); ++t)
-    for (int c = 0; c < 3; ++c) {
-      const Eigen::RowVector3d at = s.points.row(s.triangles(t, c));
-      const Eigen::RowVector3d u = s.points.row(s.triangles(t, (c + 1) % 3)) - at,
-                               v = s.points.row(s.triangles(t, (c + 2) % 3)) - at;
-      const double angle = std::atan2(u.cross(v).norm(), u.dot(v)) * 180 / std::numbers::pi;
-      result.smallest_angle_deg = std::min(result.smallest_angle_deg, angle);
-    }
-}
-
-void give_volume_back(const SurfaceReport& wanted, Surface& surface) {
-  for (int round = 0; round < 2; ++round) {
-    const SurfaceReport now = reconstruction::check_surface(surface);
-    const double offset_mm = (wanted.volume_mm3 - now.volume_mm3) / now.area_mm2;
-    surface.points += offset_mm * reconstruction::point_normals(surface.points, surface.triangles);
-  }
-}
-
-// Places of input and output that are near to the bound or beyond it; also fills in the distances.
-std::vector<Eigen::Vector3d> places_too_far(const Input& in, double bound_mm, DecimateResult& result) {
-  const Points samples = samples_of(result.surface);
-  const Eigen::VectorXd to_input = in.tree.distances_mm(samples);
-  const Eigen::VectorXd from_input = SurfaceTree(result.surface).distances_mm(in.surface.points);
-  result.to_input_mm = to_input.maxCoeff();
-  result.from_input_mm = from_input.maxCoeff();
-  result.distance_mm = std::max(result.to_input_mm, result.from_input_mm);
-  std::vector<Eigen::Vector3d> places;
-  result.border_mm = border_distance_mm(in.surface, result.surface, bound_mm, places);
-  if (result.distance_mm <= bound_mm) return places;
-  for (Eigen::Index p = 0; p < samples.rows(); ++p)
-    if (to_input(p) > bound_share * bound_mm) places.emplace_back(samples.row(p).transpose());
-  for (Eigen::Index p = 0; p < from_input.size(); ++p)
-    if (from_input(p) > bound_share * bound_mm) places.emplace_back(in.surface.points.row(p).transpose());
-  return places;
-}
-
-std::vector<Eigen::Vector3d> crossing_places(const Surface& surface) {
-  std::vector<Eigen::Vector3d> places;
-  for (const auto& [a, b] : reconstruction::self_intersections(surface))
-    for (const int t : {a, b})
-      for (int c = 0; c < 3; ++c) places.emplace_back(surface.points.row(surface.triangles(t, c)).transpose());
-  return places;
-}
-
-// One place of each cell of a grid of @p cell_mm, so that a region too far away costs a few comparisons only.
-std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& places, double cell_mm) {
-  std::map<std::array<long, 3>, Eigen::Vector3d> cells;
-  for (const Eigen::Vector3d& at : places) {
-    const Eigen::Vector3d cell = (at / cell_mm).array().floor();
-    cells.emplace(std::array<long, 3>{std::lround(cell.x()), std::lround(cell.y()), std::lround(cell.z())}, at);
-  }
-  std::vector<Eigen::Vector3d> result;
-  for (const auto& [cell, at] : cells) result.push_back(at);
-  return result;
-}
-
-// Every place goes one level below the finest level that claims it already.
-void add_places(const std::vector<Eigen::Vector3d>& places, double edge_mm, std::vector<FinePlace>& fine) {
-  const std::size_t before = fine.size();
-  for (const Eigen::Vector3d& at : thinned(places, edge_mm / 4)) {
-    int level = 0;
-    for (std::size_t i = 0; i < before; ++i)
-      if ((fine[i].point_mm - at).norm() < 2 * edge_mm / std::exp2(fine[i].level))
-        level = std::max(level, fine[i].level);
-    // The coarser levels surround the finer ones, so that edges grow step by step.
-    for (int l = 1; l <= std::min(level + 1, most_levels); ++l) fine.push_back({at, l});
-  }
-}
-
-bool same_topology(const SurfaceReport& a, const SurfaceReport& b) {
-  return b.closed() && b.manifold() && a.components == b.components && a.euler == b.euler;
-}
-
-DecimateResult unchanged(const Input& in, const DecimateOptions& options, std::string reason) {
+DecimateResult unchanged(const DecimateMeasure& measure, bool reached, std::string reason) {
   DecimateResult result;
-  result.surface = in.surface;
-  result.reached_target = in.report.triangles <= options.target_triangles;
-  if (!result.reached_target) result.reason = std::move(reason);
-  measure_shape(result);
+  result.surface = measure.input();
+  result.reached_target = reached;
+  result.reason = std::move(reason);
+  measure.measure_shape(result);
   return result;
 }
 
-// One remeshing at a given coarseness, refined until the bound holds. @return whether it is sound and within the bound
-bool refine_to_bound(const Input& in, double edge_mm, const DecimateOptions& options, DecimateResult& result) {
-  std::vector<FinePlace> fine;
-  for (int round = 0; round <= most_levels + 1; ++round) {
-    result.surface = remesh(in.start, edge_mm, fine);
-    give_volume_back(in.report, result.surface);
-    if (!same_topology(in.report, reconstruction::check_surface(result.surface))) return false;
-    std::vector<Eigen::Vector3d> places = places_too_far(in, options.max_distance_mm, result);
-    const std::vector<Eigen::Vector3d> crossings = crossing_places(result.surface);
-    if (places.empty() && crossings.empty()) return true;
-    places.insert(places.end(), crossings.begin(), crossings.end());
-    add_places(places, edge_mm, fine);
-  }
-  return false;
+std::string too_many(const DecimateResult& result, const DecimateOptions& options) {
+  return fmt::format(
+      "{} triangles are needed to stay within {} mm of the input; allow more triangles or a larger distance",
+      result.surface.triangles.rows(), options.max_distance_mm);
+}
+
+// Points that no triangle uses would be measured as if they were surface. @return whether there were any
+bool drop_unused_points(const Surface& in, const DecimateOptions& options, Surface& compact, DecimateOptions& fitting) {
+  std::vector<int> number(in.points.rows(), -1), kept;
+  for (Eigen::Index i = 0; i < in.triangles.size(); ++i) number[in.triangles.data()[i]] = 0;
+  for (int p = 0; p < static_cast<int>(number.size()); ++p)
+    if (number[p] == 0) {
+      number[p] = static_cast<int>(kept.size());
+      kept.push_back(p);
+    }
+  if (kept.size() == number.size()) return false;
+  compact = in;
+  compact.points = Points(in.points(kept, Eigen::all));
+  for (Eigen::Index i = 0; i < in.triangles.size(); ++i) compact.triangles.data()[i] = number[in.triangles.data()[i]];
+  fitting = options;
+  if (options.relative_size.size() > 0) fitting.relative_size = Eigen::VectorXd(options.relative_size(kept));
+  return true;
+}
+
+// An open surface: manifold, and not crossing itself.
+void require_sheet(const Surface& in) {
+  const std::string what = "the surface to decimate";
+  const reconstruction::SurfaceReport report = reconstruction::check_surface(in);
+  if (report.border_edges == 0) return reconstruction::require_solid(in, what);
+  const auto place = [&in](Eigen::Index p) {
+    return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", in.points(p, 0), in.points(p, 1), in.points(p, 2));
+  };
+  if (!report.manifold())
+    throw InputError(
+        fmt::format("{}: not a manifold: {} edges and {} points where more than two sheets meet or the orientation "
+                    "changes, the first at {}; repair the surface there",
+                    what, report.bad_edges, report.bad_points, place(report.first_bad_point)));
+  const auto crossings = reconstruction::self_intersections(in);
+  if (!crossings.empty())
+    throw InputError(
+        fmt::format("{}: intersects itself: {} pairs of triangles, the first at {}; repair the surface there", what,
+                    crossings.size(), place(in.triangles(crossings.front().first, 0))));
 }
 
 }  // namespace
@@ -194,48 +83,45 @@ void DecimateOptions::check() const {
     throw InputError(fmt::format("the number of triangles is {}; it must be at least 100", target_triangles));
   if (!(max_distance_mm > 0))
     throw InputError(fmt::format("the distance bound is {} mm; it must be > 0", max_distance_mm));
+  if (target_faces != 0 && target_faces < 50)
+    throw InputError(fmt::format("the number of faces is {}; it must be 0 or at least 50", target_faces));
+  if (!(edge_mm >= 0)) throw InputError(fmt::format("the edge length is {} mm; it must be > 0", edge_mm));
+  for (Eigen::Index p = 0; p < relative_size.size(); ++p)
+    if (!(relative_size(p) >= smallest_relative && relative_size(p) <= largest_relative))
+      throw InputError(fmt::format("the relative size of point {} is {}; it must lie in [{}, {}]", p, relative_size(p),
+                                   smallest_relative, largest_relative));
 }
 
 DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
   options.check();
-  reconstruction::require_solid(in, "the surface to decimate");
-  Input input{in, reconstruction::check_surface(in), SurfaceTree(in), in};
-  if (input.report.triangles <= options.target_triangles) return unchanged(input, options, "");
-
-  // Equilateral triangles of that edge would give the target; those of the remeshing come out a tenth smaller.
-  double edge_mm = 1.12 * std::sqrt(4 * input.report.area_mm2 / (std::numbers::sqrt3 * options.target_triangles));
-  const auto start_triangles = static_cast<Eigen::Index>(options.target_triangles / (start_share * start_share));
-  if (input.report.triangles > 2 * start_triangles) input.start = remesh(in, start_share * edge_mm, {}, 1);
-  DecimateResult best;
-  for (int attempt = 0; attempt < most_tries; ++attempt) {
-    DecimateResult result;
-    if (!refine_to_bound(input, edge_mm, options, result)) {
-      edge_mm *= 0.8;
-      if (best.surface.triangles.rows() > 0) break;
-      continue;
-    }
-    const auto triangles = result.surface.triangles.rows();
-    const auto best_triangles = best.surface.triangles.rows();
-    const bool fits = triangles <= options.target_triangles, best_fits = best.reached_target;
-    if (best_triangles == 0 || (fits && (!best_fits || triangles > best_triangles)) ||
-        (!fits && !best_fits && triangles < best_triangles)) {
-      best = std::move(result);
-      best.reached_target = fits;
-    }
-    if (fits && triangles >= 0.9 * options.target_triangles) break;
-    if (attempt >= 5) break;
-    edge_mm *= std::sqrt(static_cast<double>(triangles) / (0.95 * options.target_triangles));
+  if (options.open)
+    require_sheet(in);
+  else
+    reconstruction::require_solid(in, "the surface to decimate");
+  if (options.relative_size.size() != 0 && options.relative_size.size() != in.points.rows())
+    throw InputError(fmt::format("there are {} relative sizes for {} points of the surface; one each is needed",
+                                 options.relative_size.size(), in.points.rows()));
+  Surface compact;
+  DecimateOptions fitting;
+  if (drop_unused_points(in, options, compact, fitting)) return decimate(compact, fitting);
+  const DecimateMeasure measure(in);
+  if (coarse_enough(measure, options)) return unchanged(measure, true, "");
+  DecimateResult result;
+  std::string fallback;
+  if (options.method == DecimateMethod::quads) {
+    result = decimate_to_quads(measure, options);
+    if (result.surface.triangles.rows() == 0) fallback = "no sound quads within the bound: " + result.reason;
   }
-  if (best.surface.triangles.rows() == 0)
-    return unchanged(input, options,
-                     "no coarser surface stays within the bound without crossing itself; the input is returned");
-  if (!best.reached_target)
-    best.reason = fmt::format(
-        "{} triangles are needed to stay within {} mm of the input; allow more triangles or a larger distance",
-        best.surface.triangles.rows(), options.max_distance_mm);
-  best.volume_change = reconstruction::check_surface(best.surface).volume_mm3 / input.report.volume_mm3 - 1;
-  measure_shape(best);
-  return best;
+  if (result.surface.triangles.rows() == 0) result = decimate_to_triangles(measure, options);
+  if (result.surface.triangles.rows() == 0)
+    result = unchanged(measure, false,
+                       "no coarser surface stays within the bound without crossing itself (" + result.reason +
+                           "); the input is returned");
+  else if (!result.reached_target)
+    result.reason = too_many(result, options);
+  result.fallback = fallback;
+  measure.measure_shape(result);
+  return result;
 }
 
 }  // namespace supine::meshing

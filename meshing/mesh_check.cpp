@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "meshing/jacobian.h"
 #include "meshing/topology.h"
 #include "segmentation/tissue.h"
 
@@ -38,6 +39,12 @@ void check_cells(const TetMesh& mesh) {
       throw InputError(fmt::format(
           "tetrahedron {} {} has a volume of {:.6g} mm³; it must be positive (inverted or flat: mesh again)", c,
           place(mesh, mesh.cells.row(c), 4), volume));
+    }
+    if (mesh.order() == 2 && !scaled_jacobian_exceeds(quadratic_nodes(mesh, c), 0)) {
+      throw InputError(fmt::format(
+          "tetrahedron {} {} is turned inside out somewhere by its curved edges: its smallest Jacobian is {:.3g} of "
+          "the straight one's, and must be positive (mesh again)",
+          c, place(mesh, mesh.cells.row(c), 4), smallest_scaled_jacobian(quadratic_nodes(mesh, c)).high));
     }
     const int tissue = mesh.tissue[c];
     if (tissue < 0 || tissue >= segmentation::tissue_count ||

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "meshing/jacobian.h"
 #include "meshing/topology.h"
 #include "segmentation/tissue.h"
 
@@ -63,6 +64,24 @@ double radius_ratio(const CornerPoints& corners) {
   return 3 * (3 * v / area) * (24 * v) / root * (v < 0 ? -1 : 1);
 }
 
+namespace {
+
+// @return the curved volume
+double measure_curved(const TetMesh& mesh, Eigen::Index c, QualityReport& report) {
+  const QuadraticNodes nodes = quadratic_nodes(mesh, c);
+  const double jacobian = smallest_scaled_jacobian(nodes).low;
+  report.mean_scaled_jacobian += (jacobian - 1) / static_cast<double>(mesh.cells.rows());
+  ++report.scaled_jacobian[std::clamp(static_cast<int>(jacobian * 10), 0, 9)];
+  if (report.worst_jacobian_cell < 0 || jacobian < report.min_scaled_jacobian) {
+    report.worst_jacobian_cell = static_cast<int>(c);
+    report.min_scaled_jacobian = jacobian;
+  }
+  if (!(jacobian > 0)) ++report.inverted;
+  return curved_volume_mm3(nodes);
+}
+
+}  // namespace
+
 QualityReport measure_quality(const TetMesh& mesh) {
   QualityReport report;
   report.nodes = mesh.points.rows();
@@ -73,9 +92,13 @@ QualityReport measure_quality(const TetMesh& mesh) {
   for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
     CornerPoints x;
     for (int k = 0; k < 4; ++k) x.row(k) = mesh.points.row(mesh.cells(c, k));
-    const double v = volume(x), ratio = radius_ratio(x);
+    const double straight = volume(x), ratio = radius_ratio(x);
     const auto [low, high] = dihedral_range_deg(x);
-    if (!(v > 0)) ++report.inverted;
+    double v = straight;
+    if (!(straight > 0))
+      ++report.inverted;
+    else if (mesh.order() == 2)
+      v = measure_curved(mesh, c, report);
     report.min_dihedral_deg = std::min(report.min_dihedral_deg, low);
     report.max_dihedral_deg = std::max(report.max_dihedral_deg, high);
     ++report.smallest_dihedral[std::min(17, static_cast<int>(low / 10))];
@@ -90,7 +113,8 @@ QualityReport measure_quality(const TetMesh& mesh) {
     if (mesh.fraction.rows() == mesh.cells.rows()) report.tissue_ml += v / 1000 * mesh.fraction.row(c).transpose();
   }
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
-    report.area_cm2[mesh.region[f]] += face_area_mm2(mesh.points, mesh.faces, f) / 100;
+    report.area_cm2[mesh.region[f]] +=
+        (mesh.order() == 2 ? curved_area_mm2 : face_area_mm2)(mesh.points, mesh.faces, f) / 100;
     ++report.region_faces[mesh.region[f]];
   }
   return report;

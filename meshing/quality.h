@@ -23,12 +23,15 @@ double radius_ratio(const Eigen::Matrix<double, 4, 3>& corners);
 /// The health of a mesh, in numbers.
 struct QualityReport {
   Eigen::Index nodes = 0, cells = 0, faces = 0;
-  Eigen::Index inverted = 0;  ///< cells without positive volume
+  Eigen::Index inverted = 0;  ///< cells without positive volume, or turned inside out somewhere
   double min_dihedral_deg = 180, max_dihedral_deg = 0;
   std::array<Eigen::Index, 18> smallest_dihedral{};  ///< cells whose smallest angle lies in [10 i, 10 i + 10) degrees
   std::array<Eigen::Index, 18> largest_dihedral{};   ///< the same of the largest
   double min_radius_ratio = 1, mean_radius_ratio = 0;
-  int worst_cell = -1;  ///< the one with the smallest radius ratio
+  double min_scaled_jacobian = 1, mean_scaled_jacobian = 1;  ///< of quadratic cells, lower bounds (jacobian.h)
+  std::array<Eigen::Index, 10> scaled_jacobian{};  ///< quadratic cells with it in [i, i + 1) tenths; <= 0 in the first
+  int worst_jacobian_cell = -1;                    ///< -1 in linear meshes
+  int worst_cell = -1;                             ///< the one with the smallest radius ratio
   Eigen::Vector3d worst_place_mm = Eigen::Vector3d::Zero();
   double volume_ml = 0;
   Eigen::VectorXd tissue_ml;         ///< by segmentation::Tissue, from the fractions
@@ -36,7 +39,8 @@ struct QualityReport {
   std::array<Eigen::Index, 5> region_faces{};
 };
 
-/// Geometry of the corner tetrahedra; mesh.fraction may be empty.
+/// Angles and ratios of the corner tetrahedra; volumes, areas and inversion of the cells as they are, curved or not.
+/// @param mesh  mesh.fraction may be empty
 QualityReport measure_quality(const TetMesh& mesh);
 
 }  // namespace supine::meshing

@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace supine::meshing {
 namespace {
@@ -78,20 +79,21 @@ Eigen::Vector3d position(const Mesh& mesh, Mesh::Vertex_index v) {
   return {p.x(), p.y(), p.z()};
 }
 
-// Faces that no finer place claims: a place of level n claims what lies within twice its own edge length.
-std::vector<Mesh::Face_index> faces_of_level(const Mesh& mesh, int level, double edge_mm,
-                                             const std::vector<FinePlace>& fine) {
+// Whether a place of @p level or finer claims a face: those within twice that level's edge length.
+bool claimed(const Mesh& mesh, Mesh::Face_index face, int level, double edge_mm, const std::vector<FinePlace>& fine) {
+  const Half half = mesh.halfedge(face);
+  const Eigen::Vector3d at = (position(mesh, mesh.source(half)) + position(mesh, mesh.target(half)) +
+                              position(mesh, mesh.target(mesh.next(half)))) /
+                             3;
+  return std::any_of(fine.begin(), fine.end(), [&](const FinePlace& place) {
+    return place.level >= level && (place.point_mm - at).norm() < 2 * edge_mm / std::exp2(level);
+  });
+}
+
+std::vector<Mesh::Face_index> faces_where(const Mesh& mesh, const std::function<bool(Mesh::Face_index)>& wanted) {
   std::vector<Mesh::Face_index> faces;
-  for (const Mesh::Face_index face : mesh.faces()) {
-    const Half half = mesh.halfedge(face);
-    const Eigen::Vector3d at = (position(mesh, mesh.source(half)) + position(mesh, mesh.target(half)) +
-                                position(mesh, mesh.target(mesh.next(half)))) /
-                               3;
-    const bool claimed = std::any_of(fine.begin(), fine.end(), [&](const FinePlace& place) {
-      return place.level > level && (place.point_mm - at).norm() < 2 * edge_mm / std::exp2(level + 1);
-    });
-    if (!claimed) faces.push_back(face);
-  }
+  for (const Mesh::Face_index face : mesh.faces())
+    if (wanted(face)) faces.push_back(face);
   return faces;
 }
 
@@ -156,27 +158,51 @@ void flip_bad_edges(RegionMesh& work) {
   }
 }
 
-}  // namespace
-
-Surface remesh(const Surface& surface, double edge_mm, const std::vector<FinePlace>& fine, unsigned int iterations) {
+void remesh_faces(RegionMesh& work, const std::vector<Mesh::Face_index>& faces, double edge_mm,
+                  unsigned int iterations) {
   namespace pmp = CGAL::Polygon_mesh_processing;
-  RegionMesh work = to_cgal(surface);
-  int finest = 0;
-  for (const FinePlace& place : fine) finest = std::max(finest, place.level);
-  for (int level = finest; level >= 0; --level) {
-    const std::vector<Mesh::Face_index> faces = faces_of_level(work.mesh, level, edge_mm, fine);
-    pmp::isotropic_remeshing(faces, edge_mm / std::exp2(level), work.mesh,
-                             pmp::parameters::number_of_iterations(iterations)
-                                 .number_of_relaxation_steps(iterations > 1 ? 3 : 1)
-                                 .edge_is_constrained_map(work.border)
-                                 .face_patch_map(work.region)
-                                 .relax_constraints(false));
-  }
+  pmp::isotropic_remeshing(faces, edge_mm, work.mesh,
+                           pmp::parameters::number_of_iterations(iterations)
+                               .number_of_relaxation_steps(iterations > 1 ? 3 : 1)
+                               .edge_is_constrained_map(work.border)
+                               .face_patch_map(work.region)
+                               .relax_constraints(false));
+}
+
+Surface cleaned(RegionMesh& work, bool with_regions) {
   for (int round = 0; round < 3; ++round) {
     give_needles_away(work);
     flip_bad_edges(work);
   }
-  return from_cgal(work, surface.region.size() > 0);
+  return from_cgal(work, with_regions);
+}
+
+int finest_level(const std::vector<FinePlace>& fine) {
+  int finest = 0;
+  for (const FinePlace& place : fine) finest = std::max(finest, place.level);
+  return finest;
+}
+
+}  // namespace
+
+Surface remesh(const Surface& surface, double edge_mm, const std::vector<FinePlace>& fine, unsigned int iterations) {
+  RegionMesh work = to_cgal(surface);
+  for (int level = finest_level(fine); level >= 0; --level) {
+    const auto faces = faces_where(
+        work.mesh, [&](Mesh::Face_index face) { return !claimed(work.mesh, face, level + 1, edge_mm, fine); });
+    remesh_faces(work, faces, edge_mm / std::exp2(level), iterations);
+  }
+  return cleaned(work, surface.region.size() > 0);
+}
+
+Surface refine(const Surface& surface, double edge_mm, const std::vector<FinePlace>& fine) {
+  RegionMesh work = to_cgal(surface);
+  for (int level = 1; level <= finest_level(fine); ++level) {
+    const auto faces =
+        faces_where(work.mesh, [&](Mesh::Face_index face) { return claimed(work.mesh, face, level, edge_mm, fine); });
+    remesh_faces(work, faces, edge_mm / std::exp2(level), 5);
+  }
+  return cleaned(work, surface.region.size() > 0);
 }
 
 }  // namespace supine::meshing

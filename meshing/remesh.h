@@ -21,4 +21,9 @@ struct FinePlace {
 reconstruction::Surface remesh(const reconstruction::Surface& surface, double edge_mm,
                                const std::vector<FinePlace>& fine, unsigned int iterations = 5);
 
+/// The same for the fine places alone, coarsest level first: a place of level n claims what lies within 2 edge_mm / 2^n
+/// of it, and triangles no place claims stay as they are but for edges split on the band's rim.
+reconstruction::Surface refine(const reconstruction::Surface& surface, double edge_mm,
+                               const std::vector<FinePlace>& fine);
+
 }  // namespace supine::meshing

@@ -120,6 +120,7 @@ void TetrahedraliseOptions::check() const {
   if (!(min_dihedral_deg >= 0 && min_dihedral_deg <= 18)) {
     throw InputError(fmt::format("min_dihedral_deg is {}; it must lie in [0, 18]", min_dihedral_deg));
   }
+  if (!(edge_mm >= 0)) throw InputError(fmt::format("edge_mm is {}; it must be >= 0", edge_mm));
   if (cells != 0 && cells < 10) throw InputError(fmt::format("cells is {}; at least 10 are needed", cells));
 }
 
@@ -138,7 +139,7 @@ TetMesh tetrahedralise(const Surface& surface, const TetrahedraliseOptions& opti
   options.check();
   check_input(surface, what);
   const double volume = reconstruction::check_surface(surface).volume_mm3;
-  const double edge = mean_edge_mm(surface);
+  const double edge = options.edge_mm > 0 ? options.edge_mm : mean_edge_mm(surface);
   // A bound on the volume gives cells of a little over half of it on average; a regular tetrahedron has edge³ / (6 √2).
   const double regular = edge * edge * edge / (6 * std::sqrt(2.0));
   double bound = options.cells == 0 ? 1.7 * regular : 1.7 * volume / static_cast<double>(options.cells);

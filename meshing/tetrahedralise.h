@@ -11,6 +11,7 @@ namespace supine::meshing {
 
 struct TetrahedraliseOptions {
   std::size_t cells = 0;         ///< about so many tetrahedra; 0 = as the surface's triangles suggest
+  double edge_mm = 0;            ///< edges aimed at inside, >= 0; 0 = the surface's mean edge
   double radius_edge = 1.35;     ///< circumradius over shortest edge of a tetrahedron aimed at, in [1.2, 3]
   double min_dihedral_deg = 14;  ///< aimed at, in [0, 18]
   void check() const;            ///< @throws InputError naming option, value and bound

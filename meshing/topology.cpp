@@ -98,6 +98,14 @@ double cell_volume_mm3(const Points& points, const Indices& cells, Eigen::Index 
   return u.cross(v).dot(w) / 6;
 }
 
+Eigen::RowVector3d face_point(const Points& points, const Indices& faces, Eigen::Index f, double b, double c) {
+  const double a = 1 - b - c;
+  const auto node = [&](int k) { return points.row(faces(f, k)); };
+  if (faces.cols() == 3) return a * node(0) + b * node(1) + c * node(2);
+  return a * (2 * a - 1) * node(0) + b * (2 * b - 1) * node(1) + c * (2 * c - 1) * node(2) + 4 * a * b * node(3) +
+         4 * b * c * node(4) + 4 * c * a * node(5);
+}
+
 double face_area_mm2(const Points& points, const Indices& faces, Eigen::Index f) {
   const Eigen::RowVector3d a = points.row(faces(f, 0));
   const Eigen::RowVector3d u = points.row(faces(f, 1)) - a;

@@ -33,6 +33,9 @@ void set_face_cells(TetMesh& mesh);
 /// Signed volume of the corner tetrahedron of cell @p c, mm³; > 0 as TetMesh demands.
 double cell_volume_mm3(const Points& points, const Indices& cells, Eigen::Index c);
 
+/// Point of row @p f at barycentric coordinates (1 - b - c, b, c); on the curved face of a quadratic mesh.
+Eigen::RowVector3d face_point(const Points& points, const Indices& faces, Eigen::Index f, double b, double c);
+
 /// Area of the corner triangle of row @p f, mm².
 double face_area_mm2(const Points& points, const Indices& faces, Eigen::Index f);
 

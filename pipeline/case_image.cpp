@@ -68,10 +68,15 @@ fs::path case_path(const TomlReader& reader, std::string_view key, bool folder_a
 void read_case_image(const TomlReader& file, Case& result) {
   const auto image = file.sub_table("image");
   if (!image) file.fail("image", "table [image] is missing: it names the volume");
-  image->allow({"file", "kind", "cut", "rim_mm", "labels"});
+  image->allow({"file", "kind", "series", "cut", "rim_mm", "labels"});
   image->required_text("kind");
   result.image_kind = image->choice("kind", {"labels", "mri"}, "labels");
   result.image_file = case_path(*image, "file", true);
+  if (const auto series = image->text("series")) {
+    if (!fs::is_directory(result.image_file))
+      image->fail("series", "has no effect: image.file is a file, only a DICOM folder holds series");
+    result.image_series = *series;
+  }
   read_cut(*image, result.cut);
 
   const auto labels = image->sub_table("labels");

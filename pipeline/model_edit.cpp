@@ -91,6 +91,39 @@ std::string parameter_line(const Effect& effect, const Parameter& row) {
                      prior_sd, row.lower, row.upper, comment);
 }
 
+/// The table that holds the section of a parameter: "breast" of the file, or the [[effect]] of that name.
+const toml::table* section_of(const toml::table& file, const std::string& section) {
+  if (const toml::table* base = file.get_as<toml::table>(section)) return base;
+  const toml::array* entries = file.get_as<toml::array>("effect");
+  for (std::size_t i = 0; entries && i < entries->size(); ++i) {
+    const toml::table* effect = entries->get_as<toml::table>(i);
+    if (effect && (*effect)["name"].value_or(std::string_view()) == section) return effect;
+  }
+  return nullptr;
+}
+
+/// Where the number of a free parameter stands in the file.
+toml::source_region value_place(const toml::table& table, const fs::path& file, const std::string& name) {
+  const auto dot = name.find('.');
+  const toml::table* section = section_of(table, name.substr(0, dot));
+  const toml::table* entry = section ? section->get_as<toml::table>(name.substr(dot + 1)) : nullptr;
+  const toml::node* value = entry ? entry->get("value") : nullptr;
+  if (value == nullptr)
+    throw InputError(fmt::format("{} does not hold {} as a table {{ value = ... }}, so its value cannot be replaced",
+                                 file.string(), name));
+  return value->source();
+}
+
+/// Byte at which the code point @p column (1-based) of a line starts.
+std::size_t byte_of(const std::string& line, std::size_t column) {
+  std::size_t byte = 0;
+  for (std::size_t point = 1; point < column && byte < line.size(); ++point) {
+    ++byte;
+    while (byte < line.size() && (static_cast<unsigned char>(line[byte]) & 0xC0) == 0x80) ++byte;
+  }
+  return byte;
+}
+
 }  // namespace
 
 std::string effect_block(const Effect& effect) {
@@ -122,6 +155,27 @@ std::string without_effect(const fs::path& file, const std::string& name) {
   for (std::size_t i = 0; i < lines.size(); ++i)
     if (i < begin || i >= end) text += lines[i] + "\n";
   return text;
+}
+
+std::string with_values(const fs::path& file, const std::map<std::string, double>& values) {
+  const toml::table table = parse_toml(file);
+  std::vector<std::pair<toml::source_region, double>> places;
+  for (const auto& [name, value] : values) places.emplace_back(value_place(table, file, name), value);
+  // From the end of the file to its beginning, so that places further up stay where they are.
+  std::sort(places.begin(), places.end(), [](const auto& a, const auto& b) {
+    const auto &p = a.first.begin, &q = b.first.begin;
+    return p.line != q.line ? p.line > q.line : p.column > q.column;
+  });
+  const std::string text = read_text(file);
+  std::vector<std::string> lines = split_lines(text);
+  for (const auto& [place, value] : places) {
+    std::string& line = lines[place.begin.line - 1];
+    const std::size_t begin = byte_of(line, place.begin.column), end = byte_of(line, place.end.column);
+    line.replace(begin, end - begin, fmt::format("{}", value));
+  }
+  std::string edited;
+  for (const std::string& line : lines) edited += line + "\n";
+  return edited;
 }
 
 }  // namespace supine::pipeline

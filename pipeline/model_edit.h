@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <string>
 
 #include "simulation/catalogue.h"
@@ -21,5 +22,10 @@ std::string with_effect(const std::filesystem::path& file, const std::string& na
 /// that stand right above the next table belong to that and stay.
 /// @throws InputError  effect not in the file
 std::string without_effect(const std::filesystem::path& file, const std::string& name);
+
+/// The text of a model.toml with other values of free parameters; everything else, comments too, stays byte for byte.
+/// @param values  by name (parameters.h), written with all their digits
+/// @throws InputError  a parameter that the file does not hold as a table { value = … }
+std::string with_values(const std::filesystem::path& file, const std::map<std::string, double>& values);
 
 }  // namespace supine::pipeline

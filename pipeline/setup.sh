@@ -6,7 +6,7 @@ set -euo pipefail
 packages=(
   build-essential cmake ninja-build git jq
   libeigen3-dev libsuitesparse-dev libopenblas-pthread-dev
-  libvtk9-dev libcgal-dev libtet1.5-dev libopenmesh-dev libceres-dev libteem-dev zlib1g-dev
+  libvtk9-dev libcgal-dev libtet1.5-dev libopenmesh-dev libceres-dev libpagmo-dev libteem-dev libgdcm-dev zlib1g-dev
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libspdlog-dev libfmt-dev libssl-dev
   libgtest-dev libbenchmark-dev
 )

@@ -224,7 +224,8 @@ Surface read_surface(const std::filesystem::path& file, const std::string& case_
   return std::move(read.surface);
 }
 
-void write_surface(const Surface& surface, const std::filesystem::path& file) {
+void write_surface(const Surface& surface, const std::filesystem::path& file,
+                   const std::map<std::string, Eigen::VectorXi>& more) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   points->SetNumberOfPoints(surface.points.rows());
@@ -242,12 +243,14 @@ void write_surface(const Surface& surface, const std::filesystem::path& file) {
     for (vtkIdType p = 0; p < surface.points.rows(); ++p) cells->InsertNextCell(1, &p);
     data->SetVerts(cells);
   }
-  if (surface.region.size() > 0) {
-    vtkNew<vtkIntArray> region;
-    region->SetName("region");
-    for (const int value : surface.region) region->InsertNextValue(value);
-    data->GetCellData()->AddArray(region);
-  }
+  const auto add_cells = [&data](const std::string& name, const Eigen::VectorXi& values) {
+    vtkNew<vtkIntArray> array;
+    array->SetName(name.c_str());
+    for (const int value : values) array->InsertNextValue(value);
+    data->GetCellData()->AddArray(array);
+  };
+  if (surface.region.size() > 0) add_cells("region", surface.region);
+  for (const auto& [name, values] : more) add_cells(name, values);
   set_text(data, "frame", "LPS");
   set_text(data, "unit", "mm");
   vtkNew<vtkXMLPolyDataWriter> writer;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -34,7 +35,9 @@ Surface read_surface(const std::filesystem::path& file, const std::string& case_
 
 /// Writes a binary .vtp: points, triangles (vertices where there are none), the cell array `region` when the surface
 /// carries one, field data `frame` = LPS and `unit` = mm.
+/// @param more  further cell arrays by name, one value per triangle
 /// @throws InputError  when the file cannot be written
-void write_surface(const Surface& surface, const std::filesystem::path& file);
+void write_surface(const Surface& surface, const std::filesystem::path& file,
+                   const std::map<std::string, Eigen::VectorXi>& more = {});
 
 }  // namespace supine::reconstruction

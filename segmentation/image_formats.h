@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "segmentation/image.h"
+#include "segmentation/image_io.h"
 
 // Readers of one format each, for image_io.cpp alone.
 namespace supine::segmentation::formats {
@@ -24,6 +25,9 @@ RawImage read_nrrd(const std::filesystem::path& file);
 RawImage read_meta_image(const std::filesystem::path& file);
 RawImage read_nifti(const std::filesystem::path& file);
 RawImage read_vti(const std::filesystem::path& file);
+
+/// Turns what a reader found into LPS, checked as read_image says. @param file  for messages
+ImageFile finish(const std::filesystem::path& file, RawImage raw, const std::string& case_frame);
 
 /// The signs s such that diag(s) takes coordinates of @p frame to LPS; nothing for an unknown frame.
 std::optional<Eigen::Vector3d> signs_to_lps(const std::string& frame);

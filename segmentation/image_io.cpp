@@ -78,6 +78,14 @@ void check_finite(const std::filesystem::path& file, const GreyImage& image) {
                                n % row, n % slice / row, n / slice, *bad));
 }
 
+void check_not_flat(const std::filesystem::path& file, const GreyImage& image) {
+  const auto [low, high] = std::minmax_element(image.voxels.begin(), image.voxels.end());
+  // labels.vti is read here too, and a body of one tissue that fills its grid is one.
+  const bool may_be_labels = file.extension() == ".vti" && *low != 0;
+  if (*low == *high && !may_be_labels)
+    throw InputError(fmt::format("{}: every voxel is {}; the volume is empty: export it again", file.string(), *low));
+}
+
 Eigen::Vector3d frame_signs(const std::filesystem::path& file, const RawImage& raw, const std::string& case_frame) {
   if (!raw.frame && case_frame.empty())
     throw InputError(
@@ -109,10 +117,7 @@ void check_size(const std::filesystem::path& file, const Eigen::Vector3i& size) 
 
 }  // namespace formats
 
-ImageFile read_image(const std::filesystem::path& file, const std::string& case_frame) {
-  if (!std::filesystem::is_regular_file(file))
-    throw InputError(fmt::format("{}: there is no such file", file.string()));
-  RawImage raw = read_by_extension(file);
+ImageFile formats::finish(const std::filesystem::path& file, RawImage raw, const std::string& case_frame) {
   ImageFile result;
   const Eigen::Vector3d signs = frame_signs(file, raw, case_frame);
   Grid grid = raw.grid;
@@ -121,9 +126,16 @@ ImageFile read_image(const std::filesystem::path& file, const std::string& case_
   check_extent(file, grid);
   result.image = {grid, std::move(raw.voxels)};
   check_finite(file, result.image);
+  check_not_flat(file, result.image);
   result.frame = raw.frame.value_or("");
   result.warnings = std::move(raw.warnings);
   return result;
+}
+
+ImageFile read_image(const std::filesystem::path& file, const std::string& case_frame) {
+  if (!std::filesystem::is_regular_file(file))
+    throw InputError(fmt::format("{}: there is no such file", file.string()));
+  return formats::finish(file, read_by_extension(file), case_frame);
 }
 
 }  // namespace supine::segmentation

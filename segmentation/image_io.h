@@ -26,7 +26,7 @@ struct ImageFile {
 /// @throws InputError  naming file, key and value: unknown format, unreadable or truncated file, not three axes,
 /// colour,
 ///   spacing <= 0, direction not orthonormal (1e-3), a unit that is not mm, a volume less than 3 mm wide (metres),
-///   a voxel that is not finite, frame unknown, missing or in contradiction with the axes
+///   a voxel that is not finite, all voxels equal, frame unknown, missing or in contradiction with the axes
 ImageFile read_image(const std::filesystem::path& file, const std::string& case_frame);
 
 }  // namespace supine::segmentation

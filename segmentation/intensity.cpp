@@ -15,12 +15,16 @@
 #include <numbers>
 
 #include "common/error.h"
+#include "segmentation/blur.h"
+#include "segmentation/otsu.h"
 
 namespace supine::segmentation {
 namespace {
 
 constexpr double outlier_sd = 2.5;
 constexpr int fit_rounds = 8;
+constexpr int reselections = 3;
+constexpr double nearest_share = 0.7;  // of the fat's grey; muscle and gland lie below
 
 /// Monomials x^a y^b z^c, a + b + c <= degree, of coordinates scaled to about [-1, 1] over the image.
 class Polynomial {
@@ -60,14 +64,28 @@ struct Sample {
   bool used;
 };
 
-std::vector<Sample> collect_samples(const GreyImage& image, const Bias& step) {
+bool is_automatic(const Bias& step) {
+  return std::isinf(step.tissue.lower) && std::isinf(step.tissue.upper) && step.within.empty();
+}
+
+/// The tissue's range: the step's, or the upper of two classes of what is brighter than the air.
+GreyRange tissue_range(const GreyImage& image, const Bias& step) {
+  if (!is_automatic(step)) return step.tissue;
+  const double air = otsu_levels(image.voxels, 4).front();
+  std::vector<float> greys;
+  for (const float grey : image.voxels)
+    if (grey >= air) greys.push_back(grey);
+  return {static_cast<float>(otsu_levels(greys, 2).front()), std::numeric_limits<float>::infinity()};
+}
+
+std::vector<Sample> collect_samples(const GreyImage& image, const GreyRange& range, const Mask& within) {
   std::vector<Sample> samples;
   const Grid& grid = image.grid;
   for (int k = 0; k < grid.size.z(); ++k)
     for (int j = 0; j < grid.size.y(); ++j)
       for (int i = 0; i < grid.size.x(); ++i) {
         const float grey = image.at(i, j, k);
-        if (grey > 0 && step.tissue.contains(grey))
+        if (grey > 0 && range.contains(grey) && (within.empty() || within[grid.index(i, j, k)]))
           samples.push_back({i, j, k, std::log(static_cast<double>(grey)), 0, true});
       }
   return samples;
@@ -103,6 +121,33 @@ void drop_outliers(std::vector<Sample>& samples) {
   for (Sample& s : samples) s.used = std::abs(s.residual) <= bound;
 }
 
+Eigen::VectorXd settle(const Polynomial& polynomial, std::vector<Sample>& samples) {
+  Eigen::VectorXd coefficients = fit(polynomial, samples);
+  for (int round = 1; round < fit_rounds; ++round) {
+    drop_outliers(samples);
+    coefficients = fit(polynomial, samples);
+  }
+  return coefficients;
+}
+
+/// The voxels whose grey, freed of the shading found so far, is near that of the tissue.
+std::vector<Sample> reselect(const GreyImage& image, const Polynomial& polynomial,
+                             const Eigen::VectorXd& coefficients) {
+  std::vector<Sample> samples;
+  const Grid& grid = image.grid;
+  Eigen::VectorXd row(coefficients.size());
+  for (int k = 0; k < grid.size.z(); ++k)
+    for (int j = 0; j < grid.size.y(); ++j)
+      for (int i = 0; i < grid.size.x(); ++i) {
+        const double grey = image.at(i, j, k);
+        if (grey <= 0) continue;
+        polynomial.evaluate(i, j, k, row);
+        const double share = grey / std::exp(row.dot(coefficients));
+        if (share > nearest_share && share < 1 / nearest_share) samples.push_back({i, j, k, std::log(grey), 0, true});
+      }
+  return samples;
+}
+
 void divide(GreyImage& image, const Polynomial& polynomial, const Eigen::VectorXd& coefficients, float level) {
   const Grid& grid = image.grid;
 #pragma omp parallel
@@ -119,15 +164,32 @@ void divide(GreyImage& image, const Polynomial& polynomial, const Eigen::VectorX
   }
 }
 
+/// Divides by the local mean of the tissue's voxels, a Gaussian of step.local_mm wide; far from any it stays as it is.
+void divide_local(GreyImage& image, const std::vector<Sample>& samples, const Bias& step) {
+  std::vector<float> weight(image.voxels.size(), 0.0f), sum(image.voxels.size(), 0.0f);
+  for (const Sample& s : samples) {
+    if (!s.used) continue;
+    const std::size_t n = image.grid.index(s.i, s.j, s.k);
+    weight[n] = 1;
+    sum[n] = image.voxels[n];
+  }
+  gaussian_blur(weight, image.grid, step.local_mm);
+  gaussian_blur(sum, image.grid, step.local_mm);
+  constexpr float held = 1e-3f;  // weight of "no shading left", so that the far field is defined
+  for (std::size_t n = 0; n < weight.size(); ++n)
+    image.voxels[n] *= step.level * (weight[n] + held) / (sum[n] + held * step.level);
+}
+
 }  // namespace
 
 double remove_noise_floor(GreyImage& image, const NoiseFloor& step) {
+  const double air_below = step.air_below > 0 ? step.air_below : otsu_levels(image.voxels, 4).front();
   std::vector<float> air;
   for (const float grey : image.voxels)
-    if (grey < step.air_below) air.push_back(grey);
+    if (grey < air_below) air.push_back(grey);
   if (air.empty())
     throw InputError(fmt::format(
-        "noise_floor: no grey value is below air_below = {}; raise it above the greys of the air", step.air_below));
+        "noise_floor: no grey value is below air_below = {}; raise it above the greys of the air", air_below));
   const auto middle = air.begin() + static_cast<std::ptrdiff_t>(air.size() / 2);
   std::nth_element(air.begin(), middle, air.end());
   const double sigma = *middle / std::sqrt(2 * std::numbers::ln2);
@@ -136,18 +198,22 @@ double remove_noise_floor(GreyImage& image, const NoiseFloor& step) {
   return sigma;
 }
 
-BiasFit correct_bias(GreyImage& image, const Bias& step) {
+BiasFit correct_bias(GreyImage& image, const Bias& step, const Mask& within) {
   const Polynomial polynomial(image.grid, step.degree);
-  std::vector<Sample> samples = collect_samples(image, step);
+  const GreyRange range = tissue_range(image, step);
+  std::vector<Sample> samples = collect_samples(image, range, within);
   const auto needed = static_cast<std::size_t>(10 * polynomial.terms());
   if (samples.size() < needed)
     throw InputError(fmt::format(
         "bias: {} voxels lie in the greys {} to {}, {} are needed for degree {}; choose the range of the fat's greys",
-        samples.size(), step.tissue.lower, step.tissue.upper, needed, step.degree));
-  Eigen::VectorXd coefficients = fit(polynomial, samples);
-  for (int round = 1; round < fit_rounds; ++round) {
-    drop_outliers(samples);
-    coefficients = fit(polynomial, samples);
+        samples.size(), range.lower, range.upper, needed, step.degree));
+  Eigen::VectorXd coefficients = settle(polynomial, samples);
+  if (is_automatic(
+          step)) {  // the first range is one grey for the whole volume: now take the tissue where it is dark too
+    for (int round = 0; round < reselections; ++round) {
+      samples = reselect(image, polynomial, coefficients);
+      coefficients = settle(polynomial, samples);
+    }
   }
   BiasFit result;
   double squares = 0, low = INFINITY, high = -INFINITY, sum = 0;
@@ -165,6 +231,7 @@ BiasFit correct_bias(GreyImage& image, const Bias& step) {
   result.lowest = std::exp(low - mean);
   result.highest = std::exp(high - mean);
   divide(image, polynomial, coefficients, step.level);
+  if (step.local_mm > 0) divide_local(image, samples, step);
   return result;
 }
 

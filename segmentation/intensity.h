@@ -2,6 +2,7 @@
 #pragma once
 
 #include "segmentation/image.h"
+#include "segmentation/masks.h"
 #include "segmentation/recipe.h"
 
 namespace supine::segmentation {
@@ -18,8 +19,9 @@ struct BiasFit {
 };
 
 /// Divides out the shading in place; see Bias.
+/// @param within  the mask step.within names; empty = the whole image
 /// @throws InputError  when fewer voxels lie in the tissue's range than the polynomial needs (10 per coefficient)
-BiasFit correct_bias(GreyImage& image, const Bias& step);
+BiasFit correct_bias(GreyImage& image, const Bias& step, const Mask& within = {});
 
 /// Smooths in place; see Smooth.
 void smooth(GreyImage& image, const Smooth& step);

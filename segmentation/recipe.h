@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "segmentation/chest_wall.h"
 #include "segmentation/tissue.h"
 
 namespace supine::segmentation {
@@ -27,15 +28,18 @@ struct GreyRange {
 /// Removes the noise floor of a magnitude image: grey = sqrt(max(grey^2 - 2 sigma^2, 0)) (Rician second moment).
 /// Sigma is estimated from the air: median of the greys below `air_below` / sqrt(2 ln 2) (Rayleigh).
 struct NoiseFloor {
-  float air_below = 0;  ///< > 0; the file's greys
+  float air_below = 0;  ///< the file's greys; 0 = the lowest of the levels that part the greys into four classes (Otsu)
 };
 
 /// Divides out the coil's shading: exp of a polynomial in the coordinates, fitted to ln(grey) of one tissue
 /// (fat) with outliers beyond 2.5 sigma dropped. Afterwards that tissue has the grey `level`.
 struct Bias {
-  GreyRange tissue;   ///< candidates, mostly of that tissue
-  int degree = 2;     ///< total degree, 0 to 4
-  float level = 100;  ///< > 0
+  GreyRange tissue;     ///< candidates, mostly of that tissue; unbounded without `within` = the upper of two classes
+                        ///< (Otsu) of what is brighter than the air
+  int degree = 2;       ///< total degree, 0 to 4
+  float level = 100;    ///< > 0
+  std::string within;   ///< candidates lie in this mask
+  double local_mm = 0;  ///< then also divides by the tissue's local mean (Gaussian of this sd); 0 = not
 };
 
 /// Smooths the grey volume.
@@ -98,7 +102,7 @@ struct Morph {
 };
 
 /// mask = voxels of `of` whose centre lies within thickness_mm of the centre of a voxel outside `of`.
-/// The outside of the image does not count.
+/// The outside of the image does not count. A thickness below the finest voxel side counts as that side.
 struct Layer {
   std::string mask;
   std::string of;
@@ -116,6 +120,47 @@ struct Region {
   double radius_mm = 0;                                 ///< cylinder, sphere; > 0
 };
 
+/// mask = the body: what the air in front (-y) does not reach. Body is what is at least `lower` bright, and everything
+/// that the bright shell closes off from the air.
+struct Body {
+  std::string mask;
+  float lower = 0;     ///< half of the fat's grey: a voxel half full; 0 = half the median of what is no air (Otsu)
+  float air = 0;       ///< greys below are surely air, 0 < air <= lower; 0 = half of lower
+  double peel_mm = 4;  ///< darker than `lower` counts as air only this near to what is surely air
+  /// Where the skin is bright or its edge is blurred, a fixed grey lies outside it: dark is also what is below this
+  /// share of the brightest within peel_mm; 0 to below 1, 0 = off.
+  float edge_share = 0;
+  double gap_mm = 0;   ///< air does not enter through gaps narrower than twice this; >= 0
+  double open_mm = 0;  ///< things on the skin thinner than twice this (tubes, markers) are taken off; >= 0
+};
+
+/// mask = the chest: the front of the chest wall and the pectoral muscle, found as one smooth surface, and all behind
+/// it.
+struct Chest {
+  std::string mask;
+  std::string body;                  ///< a mask of step Body
+  std::optional<double> sternum_mm;  ///< x of the middle line; absent = from the cleft between the breasts
+  ChestWallOptions options;
+};
+
+/// mask = the part of the body that is modelled, between named planes; also the two sides of the sternum.
+struct Planes {
+  /// A plane across one patient axis: where it is found, plus an offset, or where the user puts it.
+  struct Plane {
+    std::optional<double> at_mm;
+    double offset_mm = 0;
+  };
+  std::string mask;
+  std::string left, right;  ///< names of two further masks; empty = not made
+  std::string body;
+  std::string chest;   ///< the mask of a step Chest
+  Plane sternum;       ///< x; parts left from right
+  Plane mid_axillary;  ///< y; the model ends there towards the back
+  Plane inframammary;  ///< z; towards the feet
+  Plane superior;      ///< z; towards the head
+  enum class Side { both, left, right } side = Side::both;
+};
+
 /// Writes `tissue` into the label map wherever the mask is; with `over`, only where one of those tissues was.
 struct Paint {
   std::string mask;
@@ -123,8 +168,8 @@ struct Paint {
   std::vector<Tissue> over;
 };
 
-using Step =
-    std::variant<NoiseFloor, Bias, Smooth, Threshold, Grow, Islands, Holes, Combine, Morph, Layer, Region, Paint>;
+using Step = std::variant<NoiseFloor, Bias, Smooth, Threshold, Grow, Islands, Holes, Combine, Morph, Layer, Region,
+                          Paint, Body, Chest, Planes>;
 
 /// The steps of a segmentation, in the order in which they run.
 struct Recipe {

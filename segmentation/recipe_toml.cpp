@@ -76,6 +76,12 @@ class Reader {
   Eigen::Vector3d vector(const std::string& key) {
     return vector_of(need(key), key).cwiseProduct(to_lps_) + Eigen::Vector3d::Zero();
   }
+  /// A place along patient axis 0, 1 or 2 in the frame of the file, returned in LPS; nothing when the key is absent.
+  std::optional<double> coordinate(const std::string& key, int axis) {
+    const toml::node* node = find(key);
+    if (!node) return std::nullopt;
+    return number_of(*node, key, {}) * to_lps_[axis];
+  }
   Eigen::Vector3d lengths(const std::string& key) { return vector_of(need(key), key); }
   std::vector<Eigen::Vector3d> points(const std::string& key) {
     std::vector<Eigen::Vector3d> result;
@@ -140,11 +146,13 @@ class Reader {
 
 constexpr Reader::Bounds positive{0, infinite, true}, not_negative{0, infinite, false};
 
-Step read_noise_floor(Reader& r) { return NoiseFloor{static_cast<float>(r.number("air_below", positive))}; }
+Step read_noise_floor(Reader& r) { return NoiseFloor{static_cast<float>(r.number_or("air_below", 0, positive))}; }
 
 Step read_bias(Reader& r) {
   Bias step;
-  step.tissue = r.range(true);
+  step.tissue = r.range(false);
+  step.within = r.name_or_empty("within");
+  step.local_mm = r.number_or("local_mm", 0, positive);
   step.degree = r.whole_or("degree", step.degree, {0, 4, false});
   step.level = static_cast<float>(r.number_or("level", step.level, positive));
   return step;
@@ -232,6 +240,67 @@ Step read_paint(Reader& r) {
   return step;
 }
 
+Step read_body(Reader& r) {
+  Body step;
+  step.mask = r.name("mask");
+  step.lower = static_cast<float>(r.number_or("lower", 0, positive));
+  step.air = static_cast<float>(r.number_or("air", 0, positive));
+  if (step.lower > 0 && step.air > step.lower)
+    r.refuse("air", fmt::format("{} is above lower = {}", step.air, step.lower));
+  step.edge_share = static_cast<float>(r.number_or("edge_share", 0, {0, 0.9, false}));
+  step.gap_mm = r.number_or("gap_mm", 0, not_negative);
+  step.peel_mm = r.number_or("peel_mm", step.peel_mm, positive);
+  step.open_mm = r.number_or("open_mm", 0, not_negative);
+  return step;
+}
+
+Step read_chest(Reader& r) {
+  Chest step;
+  step.mask = r.name("mask");
+  step.body = r.name("body");
+  step.sternum_mm = r.coordinate("sternum_mm", 0);
+  ChestWallOptions& o = step.options;
+  if (!r.name_or_empty("border").empty())
+    o.border = r.choice<ChestWallOptions::Border>(
+        "border", {{"step", ChestWallOptions::Border::step}, {"line", ChestWallOptions::Border::line}});
+  o.dark = static_cast<float>(r.number_or("dark", o.dark, {}));
+  o.bright = static_cast<float>(r.number_or("bright", o.bright, {}));
+  if (!(o.bright > o.dark)) r.refuse("bright", fmt::format("{} must be above dark = {}", o.bright, o.dark));
+  o.band_mm = r.number_or("band_mm", o.band_mm, positive);
+  o.centre_depth_mm = r.number_or("centre_depth_mm", o.centre_depth_mm, positive);
+  o.stiffness_per_mm = r.number_or("stiffness_per_mm", o.stiffness_per_mm, positive);
+  o.coupling_per_mm = r.number_or("coupling_per_mm", o.coupling_per_mm, not_negative);
+  o.far_weight = r.number_or("far_weight", o.far_weight, not_negative);
+  o.oval_pull_per_mm = r.number_or("oval_pull_per_mm", o.oval_pull_per_mm, not_negative);
+  o.refine_mm = r.number_or("refine_mm", o.refine_mm, not_negative);
+  return step;
+}
+
+Planes::Plane read_plane(Reader& r, const std::string& name, int axis) {
+  Planes::Plane plane;
+  plane.at_mm = r.coordinate(name + "_mm", axis);
+  plane.offset_mm = r.coordinate(name + "_offset_mm", axis).value_or(0);
+  if (plane.at_mm && plane.offset_mm != 0) r.refuse(name + "_offset_mm", "has no effect beside " + name + "_mm");
+  return plane;
+}
+
+Step read_planes(Reader& r) {
+  Planes step;
+  step.mask = r.name("mask");
+  step.body = r.name("body");
+  step.chest = r.name("chest");
+  step.left = r.name_or_empty("left");
+  step.right = r.name_or_empty("right");
+  step.sternum = read_plane(r, "sternum", 0);
+  step.mid_axillary = read_plane(r, "mid_axillary", 1);
+  step.inframammary = read_plane(r, "inframammary", 2);
+  step.superior = read_plane(r, "superior", 2);
+  using Side = Planes::Side;
+  if (!r.name_or_empty("side").empty())
+    step.side = r.choice<Side>("side", {{"both", Side::both}, {"left", Side::left}, {"right", Side::right}});
+  return step;
+}
+
 using StepReader = std::function<Step(Reader&)>;
 
 const std::map<std::string, StepReader>& step_readers() {
@@ -246,7 +315,10 @@ const std::map<std::string, StepReader>& step_readers() {
                                                             {"morph", read_morph},
                                                             {"layer", read_layer},
                                                             {"region", read_region},
-                                                            {"paint", read_paint}};
+                                                            {"paint", read_paint},
+                                                            {"body", read_body},
+                                                            {"chest", read_chest},
+                                                            {"planes", read_planes}};
   return readers;
 }
 

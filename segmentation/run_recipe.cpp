@@ -7,6 +7,7 @@
 #include <map>
 
 #include "common/error.h"
+#include "segmentation/body.h"
 #include "segmentation/grow.h"
 #include "segmentation/intensity.h"
 #include "segmentation/masks.h"
@@ -27,7 +28,7 @@ class Kitchen {
     return fmt::format("noise sigma {:.4g}", remove_noise_floor(image_, step));
   }
   std::string run(const Bias& step) {
-    const BiasFit fit = correct_bias(image_, step);
+    const BiasFit fit = correct_bias(image_, step, within(step.within));
     return fmt::format("shading {:.3f} to {:.3f}, residual sd {:.3f} over {} voxels", fit.lowest, fit.highest,
                        fit.residual_sd, fit.voxels);
   }
@@ -49,7 +50,16 @@ class Kitchen {
   std::string run(const Layer& step);
   std::string run(const Region& step);
   std::string run(const Paint& step);
+  std::string run(const Body& step) { return store(step.mask, find_body(image_, step)); }
+  std::string run(const Chest& step);
+  std::string run(const Planes& step);
 
+  const std::vector<CutPlane>& planes() const { return planes_; }
+  std::vector<ChestWall> take_walls() {
+    std::vector<ChestWall> walls;
+    for (auto& [name, wall] : walls_) walls.push_back(std::move(wall));
+    return walls;
+  }
   LabelImage take_labels() { return std::move(labels_); }
 
  private:
@@ -62,6 +72,8 @@ class Kitchen {
   GreyImage image_;
   LabelImage labels_;
   std::map<std::string, Mask> masks_;
+  std::map<std::string, ChestWall> walls_;
+  std::vector<CutPlane> planes_;
 };
 
 const Mask& Kitchen::mask(const std::string& name) const {
@@ -125,7 +137,7 @@ std::string Kitchen::run(const Morph& step) {
 
 std::string Kitchen::run(const Layer& step) {
   Mask result = mask(step.of);
-  const Mask core = erode(result, grid(), step.thickness_mm);
+  const Mask core = erode(result, grid(), std::max(step.thickness_mm, grid().spacing_mm.minCoeff()));
   for (std::size_t n = 0; n < result.size(); ++n) result[n] = result[n] && !core[n];
   return store(step.mask, std::move(result));
 }
@@ -168,8 +180,47 @@ std::string Kitchen::run(const Paint& step) {
   return fmt::format("{}: {} voxels", tissue_names[static_cast<int>(step.tissue)], painted);
 }
 
-constexpr const char* step_names[] = {"noise_floor", "bias",    "smooth", "threshold", "grow",   "islands",
-                                      "holes",       "combine", "morph",  "layer",     "region", "paint"};
+std::string Kitchen::run(const Chest& step) {
+  const Mask& body = mask(step.body);
+  const Torso torso = find_torso(front_skin(body, grid()), step.sternum_mm);
+  ChestWall wall = find_chest_wall(image_, body, torso, step.options);
+  Mask chest(body.size(), 0);
+  const Eigen::Vector3i size = grid().size;
+#pragma omp parallel for schedule(static)
+  for (int k = 0; k < size.z(); ++k)
+    for (int j = 0; j < size.y(); ++j)
+      for (int i = 0; i < size.x(); ++i) {
+        const std::size_t n = grid().index(i, j, k);
+        chest[n] = body[n] && wall.depth_mm(grid().point(Eigen::Vector3d(i, j, k))) >= 0;
+      }
+  const Oval oval = wall.oval;
+  walls_[step.mask] = std::move(wall);
+  return store(step.mask, std::move(chest)) +
+         fmt::format(
+             "; middle line x = {:.1f} {:+.3f} z mm from {} levels, skin over the sternum at y = {:.1f} mm; oval "
+             "half width {:.0f}, depth {:.0f} {:+.1f} z mm, power {}",
+             torso.sternum_x_mm, torso.sternum_slope, torso.slices, torso.sternum_skin_y_mm, oval.half_width_mm,
+             oval.depth_mm, oval.depth_slope, oval.power);
+}
+
+std::string Kitchen::run(const Planes& step) {
+  const Mask& body = mask(step.body);
+  const auto wall = walls_.find(step.chest);
+  if (wall == walls_.end())
+    throw InputError(fmt::format("\"{}\" is not the mask of an earlier step chest", step.chest));
+  planes_ = find_planes(front_skin(body, grid()), wall->second, step);
+  PlaneMasks masks = cut_by_planes(body, grid(), wall->second, planes_, step.side);
+  if (!step.left.empty()) store(step.left, std::move(masks.left));
+  if (!step.right.empty()) store(step.right, std::move(masks.right));
+  std::string line = store(step.mask, std::move(masks.model));
+  for (const CutPlane& plane : planes_)
+    line += fmt::format("; {} {} = {:.1f} mm{}", plane.name, plane.axis, plane.at_mm, plane.given ? " (given)" : "");
+  return line;
+}
+
+constexpr const char* step_names[] = {"noise_floor", "bias",  "smooth",  "threshold", "grow",
+                                      "islands",     "holes", "combine", "morph",     "layer",
+                                      "region",      "paint", "body",    "chest",     "planes"};
 static_assert(std::size(step_names) == std::variant_size_v<Step>);
 
 }  // namespace
@@ -189,6 +240,8 @@ RecipeResult run_recipe(GreyImage image, const Recipe& recipe,
     }
   }
   result.labels = kitchen.take_labels();
+  result.planes = kitchen.planes();
+  result.walls = kitchen.take_walls();
   return result;
 }
 

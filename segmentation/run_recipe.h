@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "segmentation/image.h"
+#include "segmentation/planes.h"
 #include "segmentation/recipe.h"
 
 namespace supine::segmentation {
@@ -13,6 +14,8 @@ namespace supine::segmentation {
 struct RecipeResult {
   LabelImage labels;
   std::vector<std::string> log;  ///< one line per step: its number, what it is, what it did (voxels, ml, sigma)
+  std::vector<CutPlane> planes;  ///< of the last step Planes
+  std::vector<ChestWall> walls;  ///< of the steps Chest
 };
 
 /// Runs the steps of a recipe on a grey volume.

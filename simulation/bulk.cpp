@@ -28,40 +28,76 @@ Eigen::Matrix<double, N, 2> edge_ends() {
   return ends;
 }
 
-/// A quadrature point with its deformation.
+/// The quadrature points of a cell, deformed, and its mean dilation θ̄ = Σ V θ / Σ V, where θ is J or, for the
+/// corotational law, tr U - 3.
 template <class Element>
-struct CellPoint {
-  TetPoint<Element> rest;
-  Matrix3 f;
-  double det_f;
-};
+struct CellStrain {
+  static constexpr int n = Element::nodes;
+  struct Point {
+    TetPoint<Element> rest;
+    Matrix3 f;
+    double det_f, theta;
+  };
+  std::array<Point, Element::points> points;
+  double least_det_f = 1e300;
+  double volume = 0, mean = 0;       // Σ V, θ̄; only with an excess
+  Nodal<n> by_x = Nodal<n>::Zero();  // Σ V ∂θ/∂x
+  Nodal<n> by_X = Nodal<n>::Zero();  // Σ V ∂θ/∂X + Σ (θ - θ̄) ∂V/∂X
 
-/// Mean dilation of a cell, θ̄ = Σ V θ / Σ V, while its points are summed.
-template <int N>
-struct MeanDilation {
-  double volume = 0, sum = 0;        // Σ V, Σ V θ
-  Nodal<N> by_x = Nodal<N>::Zero();  // Σ V ∂θ/∂x
-  Nodal<N> by_X = Nodal<N>::Zero();  // Σ V ∂θ/∂X + Σ (θ - θ̄) ∂V/∂X, with θ̄ known
-  double mean() const { return sum / volume; }
+  CellStrain(BulkLaw law, const NodeRows<n>& x, const NodeRows<n>& rest, bool averaged) {
+    for (int p = 0; p < Element::points; ++p) {
+      auto& [place, f, det_f, theta] = points[p];
+      place = tet_point<Element>(rest, p);
+      det_f = place.det;
+      if (place.det > 0) {
+        f.noalias() = x.transpose() * place.b;
+        det_f = f.determinant();
+      }
+      least_det_f = std::min(least_det_f, det_f);
+      if (!(least_det_f > 0)) return;
+      if (!averaged) continue;
+      theta = is_invariant_law(law) ? det_f : PolarPoint(f).dilation;
+      volume += place.volume;
+      mean += place.volume * theta;
+    }
+    if (averaged) mean /= volume;
+  }
 
-  void add(double theta, double weight) {
-    volume += weight;
-    sum += weight * theta;
+  /// @param slope  ∂θ/∂F B_a
+  void add_slope(const Point& point, const Nodal<n>& slope) {
+    by_x += point.rest.volume * slope;
+    by_X += point.rest.volume * ((point.theta - mean) * point.rest.b - slope * point.f);
   }
-  /// @param slope  ∂θ/∂F B_a of a point whose F is @p f
-  void add_slope(double theta, const Nodal<N>& slope, const Nodal<N>& b, const Matrix3& f, double weight) {
-    by_x += weight * slope;
-    by_X += weight * ((theta - mean()) * b - slope * f);
-  }
+
   /// The part of the matrices in which θ̄ varies; the rest goes through the pressure at the points.
-  void add_to(double excess, const Demand& demand, ElementSums<N>& sums) const {
-    const double scale = excess / volume;
-    if (demand.tangent) sums.add_outer(by_x, by_x, scale, true);
-    if (demand.reference_tangent) sums.add_reference_outer(by_x, by_X, scale);
+  void add_mean(double stiffness, const Demand& demand, ElementSums<n>& sums) const {
+    if (demand.tangent) sums.add_outer(by_x, by_x, stiffness / volume, true);
+    if (demand.reference_tangent) sums.add_reference_outer(by_x, by_X, stiffness / volume);
   }
 };
+
+VolumeEnergy mean_energy(BulkLaw law, double mean) {
+  if (law == BulkLaw::corotational) return {0.5 * mean * mean, mean, 1};
+  return volume_energy(law, mean);
+}
 
 }  // namespace
+
+std::string locking_warning(int order, const Eigen::VectorXd& poisson, Volumetric volumetric) {
+  constexpr double linear_limit = 0.46, pointwise_limit = 0.48;
+  const double highest = poisson.size() > 0 ? poisson.maxCoeff() : 0;
+  if (order == 1 && highest > linear_limit)
+    return fmt::format(
+        "Poisson's ratio {:.4g} with linear tetrahedra: they lock, and move too little by a third and more; use a mesh "
+        "of quadratic ones (supine-tetrahedralise --order 2)",
+        highest);
+  if (order == 2 && volumetric == Volumetric::pointwise && highest > pointwise_limit)
+    return fmt::format(
+        "Poisson's ratio {:.4g} with breast.volumetric = \"pointwise\": quadratic tetrahedra lock; leave volumetric "
+        "out or write \"mean\"",
+        highest);
+  return {};
+}
 
 template <class T>
 SplitLambda<T> split_lambda(const BulkMaterial<T>& m) {
@@ -115,57 +151,40 @@ void BulkTerm<Element>::add_cell(int e, const State& state, const Demand& demand
   const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
   const BulkLaw law = settings_.law;
   const auto& [material, excess] = material_[e];
-  std::array<CellPoint<Element>, Element::points> points;
-  MeanDilation<n> mean;
-  for (int p = 0; p < Element::points; ++p) {
-    auto& [place, f, det_f] = points[p];
-    place = tet_point<Element>(rest, p);
-    det_f = place.det;
-    if (place.det > 0) {
-      f.noalias() = x.transpose() * place.b;
-      det_f = f.determinant();
-    }
-    local.min_det_f = std::min(local.min_det_f, det_f);
-    if (!(det_f > 0)) return;
-    if (excess > 0)
-      mean.add(is_invariant_law(law) ? dilation(law, InvariantStrain(f, det_f)).value : PolarPoint(f).dilation,
-               place.volume);
-  }
-  const double pressure = excess > 0 ? excess * mean.mean() : 0;
-  if (excess > 0 && demand.energy) local.energy += 0.5 * pressure * mean.sum;
+  const bool averaged = excess > 0, matrices = demand.tangent || demand.reference_tangent;
+  CellStrain<Element> strain(law, x, rest, averaged);
+  local.min_det_f = std::min(local.min_det_f, strain.least_det_f);
+  if (!(local.min_det_f > 0)) return;
+  const VolumeEnergy mean = averaged ? mean_energy(law, strain.mean) : VolumeEnergy{0, 0, 0};
+  const double pressure = excess * mean.first;
+  if (demand.energy) local.energy += excess * strain.volume * mean.energy;
 
-  const bool matrices = demand.tangent || demand.reference_tangent;
   ElementSums<n> sums;
   sums.clear(demand);
-  for (const auto& [place, f, det_f] : points) {
+  for (const auto& point : strain.points) {
+    const auto& [place, f, det_f, theta] = point;
     if (is_invariant_law(law)) {
-      const InvariantStrain strain(f, det_f);
-      const double margin = law_margin(law, strain, material);
-      local.min_det_f = std::min(local.min_det_f, margin > 0 ? local.min_det_f : margin);
+      const InvariantStrain s(f, det_f);
+      const double margin = law_margin(law, s, material);
+      if (!(margin > 0)) local.min_det_f = std::min(margin, 0.0);
       if (!(margin > 0)) return;
-      auto response = invariant_response(law, strain, material);
+      auto response = invariant_response(law, s, material);
       if (demand.energy) local.energy += place.volume * response.energy;
-      if (excess > 0) {
-        const auto theta = dilation(law, strain);
-        response.wl += pressure * theta.first;
-        response.wll += pressure * theta.second;
-        if (matrices)
-          mean.add_slope(theta.value, theta.first * (place.b * strain.g.transpose()), place.b, f, place.volume);
-      }
-      if (demand.residual || matrices) add_invariant_point<n>(strain, response, place.b, place.volume, demand, sums);
+      response.wl += pressure * det_f;
+      response.wll += pressure * det_f;
+      add_invariant_point<n>(s, response, place.b, place.volume, demand, sums);
+      if (averaged && matrices) strain.add_slope(point, det_f * (place.b * s.g.transpose()));
     } else if (law == BulkLaw::corotational) {
-      const PolarPoint point(f);
-      if (demand.energy) local.energy += place.volume * point.energy(material);
-      if (excess > 0 && matrices)
-        mean.add_slope(point.dilation, place.b * point.r.transpose(), place.b, f, place.volume);
-      if (demand.residual || matrices)
-        add_polar_point<n>(point, material, pressure, place.b, place.volume, demand, sums);
+      const PolarPoint polar(f);
+      if (demand.energy) local.energy += place.volume * polar.energy(material);
+      add_polar_point<n>(polar, material, pressure, place.b, place.volume, demand, sums);
+      if (averaged && matrices) strain.add_slope(point, place.b * polar.r.transpose());
     } else {
       add_qr_point<n>(f, rest_edges<n>(rest), material, place.b, place.volume, edge_ends<n>(), demand, sums);
     }
   }
-  if (excess > 0 && matrices) mean.add_to(excess, demand, sums);
-  if (demand.residual || matrices) sums.write(demand, law != BulkLaw::corotational_qr, local);
+  if (averaged) strain.add_mean(excess * mean.second, demand, sums);
+  sums.write(demand, law != BulkLaw::corotational_qr, local);
 }
 
 template <class Element>
@@ -180,22 +199,15 @@ void BulkTerm<Element>::add_cell_derivative(int e, const State& state, const Cel
   constexpr int n = Element::nodes;
   const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
   const BulkLaw law = settings_.law;
-  std::array<CellPoint<Element>, Element::points> points;
-  MeanDilation<n> mean;
-  for (int p = 0; p < Element::points; ++p) {
-    auto& [place, f, det_f] = points[p];
-    place = tet_point<Element>(rest, p);
-    if (!(place.det > 0)) return;
-    f = x.transpose() * place.b;
-    if (material.excess != Dual(0.0))
-      mean.add(is_invariant_law(law) ? dilation(law, InvariantStrain(f)).value : PolarPoint(f).dilation, place.volume);
-  }
-  const Dual pressure = material.excess != Dual(0.0) ? Dual(material.excess * mean.mean()) : Dual(0.0);
-  for (const auto& [place, f, det_f] : points) {
-    const auto stress = bulk_stress<Dual>(law, f, material.point, rest_edges<n>(rest), pressure);
+  const bool averaged = material.excess.a > 0;
+  const CellStrain<Element> strain(law, x, rest, averaged);
+  if (!(strain.least_det_f > 0)) return;
+  const Dual pressure = averaged ? material.excess * mean_energy(law, strain.mean).first : Dual(0.0);
+  for (const auto& point : strain.points) {
+    const auto stress = bulk_stress<Dual>(law, point.f, material.point, rest_edges<n>(rest), pressure);
     Matrix3 derivative;
     for (int i = 0; i < 9; ++i) derivative.data()[i] = stress.data()[i].v[0];
-    const Nodal<n> force = place.volume * place.b * derivative.transpose();
+    const Nodal<n> force = point.rest.volume * point.rest.b * derivative.transpose();
     for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += force.row(a).transpose();
   }
 }

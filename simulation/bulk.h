@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "simulation/bulk_laws.h"
@@ -14,8 +15,8 @@ struct BulkSettings {
   Volumetric volumetric = Volumetric::mean;
 };
 
-/// λ up to which every quadrature point of a cell resists a change of its own volume, as a multiple of μ: ν = 0.45.
-inline constexpr double pointwise_lambda_over_mu = 9.0;
+/// λ up to which every quadrature point of a cell resists a change of its own volume, as a multiple of μ: ν = 1/3.
+inline constexpr double pointwise_lambda_over_mu = 2.0;
 
 /// λ split into a part that acts at every quadrature point and the excess that acts on the cell's mean dilation:
 /// λ = pointwise + excess, excess = 0 up to pointwise_lambda_over_mu and smooth (C1) beyond.
@@ -26,9 +27,14 @@ struct SplitLambda {
 template <class T>
 SplitLambda<T> split_lambda(const BulkMaterial<T>& m);
 
-/// Elasticity of the tissue: r_ai = ∫ P_iJ ∂N_a/∂X_J dV over the undeformed volume, plus, where nearly incompressible
-/// quadratic cells would lock, V/2 excess θ̄² with θ̄ the mean over the cell of θ = ln J (J - 1 for
-/// neo_hookean_calculix, tr U - 3 for corotational). ∂r/∂X is exact; see docs/mechanics.md.
+/// What to tell the user where cells of this order lock: linear ones above ν = 0.46, quadratic ones above 0.48 with the
+/// volume pointwise. Empty where they do not. @param poisson  #cells
+std::string locking_warning(int order, const Eigen::VectorXd& poisson, Volumetric volumetric);
+
+/// Elasticity of the tissue: r_ai = ∫ P_iJ ∂N_a/∂X_J dV over the undeformed volume, plus, where quadratic cells would
+/// lock, V excess/2 ln²Ĵ with Ĵ the ratio of the cell's deformed to its undeformed volume V (Simo, Taylor and Pister
+/// 1985); (Ĵ - 1)² for neo_hookean_calculix, the square of the mean of tr U - 3 for corotational. ∂r/∂X is exact; see
+/// docs/mechanics.md.
 /// @tparam Element  Tet4 or Tet10
 template <class Element>
 class BulkTerm : public Term {

@@ -22,14 +22,14 @@ double bulk_energy(BulkLaw law, const Matrix3& f, const BulkMaterial<double>& m)
 
 /// First Piola-Kirchhoff stress P = ∂W/∂F, kPa; T = Dual carries the derivative with respect to the material.
 /// @param rest      undeformed edges, used by corotational_qr only
-/// @param pressure  p of the cell's mean dilation θ, kPa: adds p ∂θ/∂F (bulk.h)
+/// @param pressure  of the cell's mean volume, kPa (bulk.h): adds it times ∂J/∂F, or times R for the corotational laws
 template <class T>
 Eigen::Matrix<T, 3, 3> bulk_stress(BulkLaw law, const Matrix3& f, const BulkMaterial<T>& m, const Edges& rest,
                                    const T& pressure = T(0.0)) {
   if (is_invariant_law(law)) {
     const InvariantStrain strain(f);
     InvariantResponse<T> response = invariant_response(law, strain, m);
-    response.wl += pressure * dilation(law, strain).first;
+    response.wl += pressure * strain.j;  // ∂J/∂L
     return stress_of(strain, response);
   }
   const Matrix3 r = law == BulkLaw::corotational ? polar_rotation(f) : qr_rotation(f, rest);

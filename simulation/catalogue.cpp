@@ -47,9 +47,11 @@ const std::vector<const Effect*>& catalogue() {
   static const Misregistration misregistration;
   static const SegmentationOffset segmentation_offset;
   static const std::vector<const Effect*> all = {
-      &adhesion,     &ligament,           &friction,        &strain_stiffening, &fibre_anisotropy, &incompressibility, &gland,
-      &tumour,       &stiffness_gradient, &skin_prestretch, &skin_stiffening,   &creep,
-      &arm_traction, &chest_wall_motion,  &gravity_tilt,    &misregistration,   &segmentation_offset};
+      &adhesion,           &ligament,          &friction,        &strain_stiffening,
+      &fibre_anisotropy,   &incompressibility, &gland,           &tumour,
+      &stiffness_gradient, &skin_prestretch,   &skin_stiffening, &creep,
+      &arm_traction,       &chest_wall_motion, &gravity_tilt,    &misregistration,
+      &segmentation_offset};
   return all;
 }
 

@@ -183,7 +183,8 @@ const char* why_unread(const Model& model, const std::string& column) {
       is({"interface_normal", "interface_tangential", "interface_friction", "muscle_offset"}))
     return "interface.kind = \"fixed\" holds the whole inner surface; use \"sliding\" or remove the effect";
   if (model.breast.law != BulkLaw::neo_hookean && is({"stiffening"}))
-    return "it acts on breast.law = \"neo_hookean\" only (yeoh and gent stiffen by numbers of their own; mooney_rivlin, "
+    return "it acts on breast.law = \"neo_hookean\" only (yeoh and gent stiffen by numbers of their own; "
+           "mooney_rivlin, "
            "neo_hookean_calculix, corotational and corotational_qr do not); change the law or remove the effect";
   if (model.skin.young_modulus_kpa.value == 0 && is({"skin_prestretch", "skin_stiffening"}))
     return "skin.young_modulus_kpa = 0 leaves no skin; give it a modulus or remove the effect";

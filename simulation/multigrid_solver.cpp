@@ -83,8 +83,10 @@ MultigridSolver::~MultigridSolver() = default;
 
 bool MultigridSolver::factorise(const SparseMatrix& matrix, double shift) {
   State& s = *state_;
-  std::copy_n(matrix.valuePtr(), matrix.nonZeros(), s.value.data());
-  check(PetscObjectStateIncrease(reinterpret_cast<PetscObject>(s.matrix)));
+  PetscScalar* entries = nullptr;
+  check(MatSeqAIJGetArray(s.matrix, &entries));
+  std::copy_n(matrix.valuePtr(), matrix.nonZeros(), entries);
+  check(MatSeqAIJRestoreArray(s.matrix, &entries));
   if (shift != 0) check(MatShift(s.matrix, shift));
   if (s.cycle == nullptr) {
     check(PCCreate(PETSC_COMM_SELF, &s.cycle));

@@ -21,6 +21,8 @@ bool NewtonDirection::deformed(const State& state, double tolerance, double move
   exact_ = true;
   if (!mechanics_.has_energy()) {  // ∂r/∂x is not symmetric: its lower half only preconditions
     if ((!have_factor_ || outworn_) && !factorise(state, tolerance, sums, nullptr)) return false;
+    if (!exact_) mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true}, sums);
+    exact_ = true;  // the factor may be of a changed tangent, GMRES solves with the matrix itself
     return by_gmres(sums.tangent, 1, tolerance, sums, step);
   }
   const bool worth_trying = have_factor_ && !outworn_ && (moved_mm < close_mm || factor_->solves_per_factor() > 12);

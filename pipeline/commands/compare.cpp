@@ -7,12 +7,15 @@
 #include <optional>
 
 #include "calibration/comparison_files.h"
+#include "calibration/scan_motion.h"
 #include "common/error.h"
 #include "meshing/anatomy.h"
 #include "meshing/mesh_io.h"
 #include "pipeline/case.h"
+#include "pipeline/model_file.h"
 #include "pipeline/tool.h"
 #include "reconstruction/surface_io.h"
+#include "simulation/catalogue.h"
 
 namespace supine::pipeline {
 namespace {
@@ -30,6 +33,7 @@ struct Inputs {
   Pose pose;
   meshing::PoseMesh predicted;
   reconstruction::Surface surface;
+  simulation::Model model;  ///< without effects unless --model names one
 };
 
 class CompareTool : public Tool {
@@ -50,6 +54,9 @@ class CompareTool : public Tool {
     app.add_option("case", case_folder_, "case folder, holds case.toml")->required();
     app.add_option("pose_file", pose_file_, "shape of the model in the pose, as supine-simulate writes it (.vtu)")
         ->required();
+    app.add_option("--model", model_file_,
+                   "model that says where the scan lies (effect misregistration): the scan and its landmarks are moved "
+                   "there first");
     app.add_option("--pose", pose_name_, "which measurement of the case (default: the name of the pose file)");
   }
 
@@ -63,9 +70,12 @@ class CompareTool : public Tool {
     const std::string scan_name = inputs.pose.surface->string();
     run.stage("check");
     const calibration::ModelSkin model(inputs.predicted.mesh, inputs.predicted.positions);
-    const calibration::Scan scan(inputs.surface, model, scan_name);
+    const calibration::ScanMotion motion = scan_motion(inputs, model, scan_name);
+    reconstruction::Surface surface = inputs.surface;
+    surface.points = motion.corrected(surface.points);
+    const calibration::Scan scan(surface, model, scan_name);
     calibration::check_placement(scan, model, inputs.predicted.mesh.muscle, scan_name);
-    const auto landmarks = compare_landmarks(inputs, run);
+    const auto landmarks = compare_landmarks(inputs, motion, run);
     run.stage("anatomy");
     const calibration::SkinAreas areas = find_areas(inputs, run);
     run.stage("compare");
@@ -87,7 +97,7 @@ class CompareTool : public Tool {
  private:
   Inputs read(Run& run) const {
     run.input(case_folder_ / "case.toml");
-    Inputs inputs{read_case(case_folder_), {}, {}, {}};
+    Inputs inputs{read_case(case_folder_), {}, {}, {}, {}};
     inputs.pose = inputs.measured.pose(pose_name_.empty() ? pose_file_.stem().string() : pose_name_);
     if (!inputs.pose.surface) {
       throw InputError(
@@ -97,6 +107,7 @@ class CompareTool : public Tool {
     }
     inputs.predicted = meshing::read_pose(run.input(pose_file_));
     inputs.surface = reconstruction::read_surface(run.input(*inputs.pose.surface), inputs.measured.frame);
+    if (!model_file_.empty()) inputs.model = read_model(run.input(model_file_));
     return inputs;
   }
 
@@ -109,7 +120,8 @@ class CompareTool : public Tool {
     return calibration::anatomical_areas(inputs.predicted.mesh, anatomy);
   }
 
-  std::vector<calibration::LandmarkError> compare_landmarks(const Inputs& inputs, Run& run) const {
+  std::vector<calibration::LandmarkError> compare_landmarks(const Inputs& inputs,
+                                                            const calibration::ScanMotion& motion, Run& run) const {
     if (!inputs.pose.landmarks) return {};
     const fs::path predicted = pose_file_.parent_path() / (pose_file_.stem().string() + "_landmarks.csv");
     if (!fs::exists(predicted)) {
@@ -117,12 +129,27 @@ class CompareTool : public Tool {
                            predicted.string()));
       return {};
     }
-    const Landmarks measured = read_landmarks(run.input(*inputs.pose.landmarks), inputs.measured.frame);
+    Landmarks measured = read_landmarks(run.input(*inputs.pose.landmarks), inputs.measured.frame);
+    measured.points = motion.corrected(measured.points);
     try {
       return calibration::compare_landmarks(read_landmarks(run.input(predicted)), measured);
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", inputs.pose.landmarks->string(), error.what()));
     }
+  }
+
+  /// Where the model says that the scan lies. Its centroid is that of the points a Scan keeps, as in calibration.
+  static calibration::ScanMotion scan_motion(const Inputs& inputs, const calibration::ModelSkin& model,
+                                             const std::string& scan_name) {
+    Eigen::VectorXd motion = Eigen::VectorXd::Zero(6);
+    for (const auto& effect : inputs.model.effects) {
+      if (effect.name != "misregistration") continue;
+      const auto& rows = simulation::find_effect(effect.name)->parameters();
+      for (std::size_t i = 0; i < rows.size(); ++i)
+        motion[static_cast<Eigen::Index>(i)] = effect.parameters.at(rows[i].name).value;
+    }
+    if (motion.isZero(0)) return {motion, inputs.surface.points};
+    return {motion, calibration::Scan(inputs.surface, model, scan_name).points()};
   }
 
   fs::path target(const Pose& pose, const std::string& stem) const {
@@ -200,7 +227,7 @@ class CompareTool : public Tool {
     }
   }
 
-  fs::path case_folder_, pose_file_;
+  fs::path case_folder_, pose_file_, model_file_;
   std::string pose_name_;
 };
 

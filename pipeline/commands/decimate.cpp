@@ -3,6 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
+
+#include "common/error.h"
 #include "pipeline/tool.h"
 #include "reconstruction/surface_check.h"
 #include "reconstruction/surface_io.h"
@@ -19,13 +23,15 @@ class DecimateTool : public Tool {
   std::string name() const override { return "supine-decimate"; }
 
   std::string summary() const override {
-    return "Decimates a closed surface to well-shaped triangles, never further from it than a bound; region borders "
-           "stay chains of edges.\n"
+    return "Decimates a closed surface to field-aligned quads, each written as two triangles, never further from it "
+           "than "
+           "a bound; region borders stay chains of edges.\n"
            "Writes coarse.vtp (default: beside the input). Exit code 1 when more triangles were needed than asked "
            "for.\n\n"
            "Examples:\n"
            "  supine-decimate breast.vtp --triangles 3000 --max-distance-mm 1\n"
-           "  supine-decimate breast.vtp --triangles 8000 --max-distance-mm 0.5 -o fine.vtp\n";
+           "  supine-decimate breast.vtp --faces 1500 --finer 12,-80,5,15,0.5\n"
+           "  supine-decimate breast.vtp --method triangles --triangles 8000 --max-distance-mm 0.5 -o fine.vtp\n";
   }
 
   void declare(CLI::App& app) override {
@@ -35,6 +41,15 @@ class DecimateTool : public Tool {
     app.add_option("--max-distance-mm", options_.max_distance_mm,
                    "bound on the distance to the input, either way, mm, > 0")
         ->capture_default_str();
+    app.add_option("--faces", options_.target_faces, "instead: about so many quads and lone triangles, >= 50");
+    app.add_option("--edge-mm", options_.edge_mm, "instead: edge length, mm, > 0");
+    app.add_option("--method", method_, "quads, or triangles of one size")
+        ->check(CLI::IsMember({"quads", "triangles"}))
+        ->capture_default_str();
+    app.add_option("--finer", finer_,
+                   "X,Y,Z,RADIUS,FACTOR: edges FACTOR times as long (0.05 to 1) within RADIUS mm of a place, growing "
+                   "gently outside; may be repeated");
+    app.add_flag("--open", options_.open, "accept a surface with open borders and keep them");
   }
 
   Outcome run(Run& run) override {
@@ -42,16 +57,21 @@ class DecimateTool : public Tool {
     const reconstruction::Surface in = reconstruction::read_surface(run.input(surface_));
     run.stage("decimate");
     run.progress("decimating");
+    options_.method = method_ == "quads" ? meshing::DecimateMethod::quads : meshing::DecimateMethod::triangles;
+    if (!finer_.empty()) options_.relative_size = relative_size(in);
     const DecimateResult result = meshing::decimate(in, options_);
     run.stage("write");
     const fs::path target = output.empty() ? fs::path(surface_).parent_path() / "coarse.vtp" : output;
-    reconstruction::write_surface(result.surface, run.output(target));
+    reconstruction::write_surface(result.surface, run.output(target), {{"quad", result.quad}});
     fill(run.figures(target), in, result);
     run.say(fmt::format("{} -> {} triangles, edges {:.2f} mm, smallest angle {:.1f} degrees", in.triangles.rows(),
                         result.surface.triangles.rows(), result.edge_mm, result.smallest_angle_deg));
+    run.say(fmt::format("{} quads, {} triangles alone ({:.1f} % quads)", result.quads, result.alone,
+                        100.0 * result.quads / (result.quads + result.alone)));
     run.say(fmt::format("largest distance {:.3f} mm, volume {:+.4f} %, region borders within {:.2f} mm",
                         result.distance_mm, 100 * result.volume_change, result.border_mm));
     run.say(target.string());
+    if (!result.fallback.empty()) run.warn(result.fallback);
     if (result.reached_target) return Outcome::done;
     run.warn("target not reached because " + result.reason);
     return Outcome::target_not_met;
@@ -65,9 +85,15 @@ class DecimateTool : public Tool {
     json["target_triangles"] = options_.target_triangles;
     json["reached_target"] = result.reached_target;
     if (!result.reason.empty()) json["reason"] = result.reason;
+    if (!result.fallback.empty()) json["fallback"] = result.fallback;
+    json["quads"] = result.quads;
+    json["triangles_alone"] = result.alone;
+    json["quad_deviation_deg"] = result.mean_deviation_deg;
     json["distance_mm"] = result.distance_mm;
     json["distance_to_input_mm"] = result.to_input_mm;
     json["distance_from_input_mm"] = result.from_input_mm;
+    json["mean_distance_to_input_mm"] = result.mean_to_input_mm;
+    json["mean_distance_from_input_mm"] = result.mean_from_input_mm;
     json["max_distance_mm"] = options_.max_distance_mm;
     json["border_distance_mm"] = result.border_mm;
     json["volume_ml"] = report.volume_mm3 / 1000;
@@ -84,7 +110,40 @@ class DecimateTool : public Tool {
     json["self_intersections"] = reconstruction::self_intersections(result.surface).size();
   }
 
-  std::string surface_;
+  Eigen::VectorXd relative_size(const reconstruction::Surface& in) const {
+    Eigen::VectorXd sizes = Eigen::VectorXd::Ones(in.points.rows());
+    for (const std::string& text : finer_) {
+      const std::vector<double> values = numbers(text);
+      const Eigen::RowVector3d centre(values[0], values[1], values[2]);
+      for (Eigen::Index p = 0; p < sizes.size(); ++p) {
+        // Twice the radius away the common size is reached again.
+        const double away = ((in.points.row(p) - centre).norm() - values[3]) / values[3];
+        sizes(p) = std::min(sizes(p), values[4] + (1 - values[4]) * std::clamp(away, 0.0, 1.0));
+      }
+    }
+    return sizes;
+  }
+
+  static std::vector<double> numbers(const std::string& text) {
+    std::vector<double> values;
+    const char *at = text.data(), *end = at + text.size();
+    while (at < end) {
+      double value = 0;
+      const auto [stop, error] = std::from_chars(at, end, value);
+      if (error != std::errc() || (stop < end && *stop != ',')) break;
+      values.push_back(value);
+      at = stop + 1;
+    }
+    if (values.size() != 5 || at < end || !(values[3] > 0) || !(values[4] >= 0.05 && values[4] <= 1))
+      throw InputError(
+          fmt::format("--finer {}: five numbers X,Y,Z,RADIUS,FACTOR are needed, mm, with RADIUS > 0 and FACTOR in "
+                      "[0.05, 1]",
+                      text));
+    return values;
+  }
+
+  std::string surface_, method_ = "quads";
+  std::vector<std::string> finer_;
   meshing::DecimateOptions options_;
 };
 

@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "common/error.h"
 #include "pipeline/case.h"
 #include "pipeline/tool.h"
 #include "segmentation/data_file.h"
+#include "segmentation/dicom_io.h"
 #include "segmentation/image_io.h"
 #include "segmentation/label_map.h"
 #include "segmentation/labels_io.h"
+#include "segmentation/leaks.h"
+#include "segmentation/overlay.h"
 #include "segmentation/recipe_toml.h"
 #include "segmentation/run_recipe.h"
 
@@ -40,6 +46,8 @@ struct Findings {
   segmentation::ComponentCounts components;
   std::optional<segmentation::Dice> dice;
   std::vector<std::string> recipe_log;
+  std::vector<segmentation::CutPlane> planes;         ///< of an automatic recipe
+  std::array<segmentation::TissueCounts, 2> sides{};  ///< voxels left and right of the sternum plane, when there is one
   std::string file_frame;
 };
 
@@ -72,6 +80,9 @@ class SegmentTool : public Tool {
   void declare(CLI::App& app) override {
     app.add_option("case", case_folder_, "case folder, holds case.toml")->required();
     app.add_option("--recipe", recipe_file_, "file with a [segmentation] table, instead of the one in case.toml");
+    app.add_option("--overlays", overlay_folder_,
+                   "folder for three PNG mosaics, one per axis, with the outlines of the tissues");
+    app.add_option("--slices", overlay_options_.slices, "slices per mosaic")->check(CLI::Range(1, 64));
     app.add_option("--truth", truth_file_,
                    "label volume on the same grid, mapped by [image.labels] of the case: prints Dice overlaps");
   }
@@ -85,6 +96,7 @@ class SegmentTool : public Tool {
     run.stage("check");
     check(measured, labels);
     findings.voxels = segmentation::count_tissues(labels);
+    count_sides(labels, findings);
     run.progress("counting components");
     findings.components = segmentation::count_components(labels);
     if (findings.components.meshed > 1)
@@ -98,12 +110,13 @@ class SegmentTool : public Tool {
     run.progress("writing");
     segmentation::write_labels(labels, run.output(target), notes_of(measured));
     fill(run.figures(target), measured, labels.grid, findings);
+    if (!overlay_folder_.empty()) write_overlays(labels, run);
     say(run, labels.grid, findings, target);
     return Outcome::done;
   }
 
  private:
-  LabelImage make_labels(const Case& measured, Run& run, Findings& findings) const {
+  LabelImage make_labels(const Case& measured, Run& run, Findings& findings) {
     const std::string file = measured.image_file.string();
     if (!recipe_file_.empty() && measured.image_kind != "mri")
       throw InputError(fmt::format("--recipe {}: the case has image.kind = \"{}\"; a recipe needs \"mri\"",
@@ -121,22 +134,47 @@ class SegmentTool : public Tool {
     }
     run.stage("recipe");
     const segmentation::Recipe recipe = find_recipe(measured, run);
+    grey_ = volume.image;
     auto result = segmentation::run_recipe(std::move(volume.image), recipe,
                                            [&run](const std::string& line) { run.progress(line); });
     findings.recipe_log = std::move(result.log);
+    findings.planes = std::move(result.planes);
+    for (const auto& wall : result.walls) {
+      double back_mm = std::numeric_limits<double>::infinity();
+      for (const auto& plane : findings.planes)
+        if (plane.name == "mid_axillary") back_mm = plane.at_mm;
+      for (const auto& leak : segmentation::find_leaks(wall, back_mm)) run.warn(segmentation::describe(leak));
+    }
     return std::move(result.labels);
   }
 
   static segmentation::ImageFile read_volume(const fs::path& file, const Case& measured, Run& run) {
-    if (fs::is_directory(file))
-      throw InputError(
-          fmt::format("{}: a DICOM folder is not read by this version; convert the series to one .nrrd, .mha or "
-                      ".nii.gz file (for example with 3D Slicer or dcm2niix)",
-                      file.string()));
+    if (fs::is_directory(file)) return read_series(file, measured, run);
     segmentation::ImageFile volume = segmentation::read_image(run.input(file), measured.frame);
     if (const auto voxels = segmentation::detached_data_file(file)) run.input(*voxels);
     for (const auto& warning : volume.warnings) run.warn(warning);
     return volume;
+  }
+
+  /// A DICOM series, checked against what the case says about the patient.
+  static segmentation::ImageFile read_series(const fs::path& folder, const Case& measured, Run& run) {
+    segmentation::DicomVolume volume = segmentation::read_dicom(folder, measured.image_series);
+    for (const fs::path& file : volume.series.files) run.input(file);
+    const std::string& position = volume.series.patient_position;
+    const bool prone = position == "HFP" || position == "FFP", supine = position == "HFS" || position == "FFS";
+    const double falls_back = measured.pose("prone").gravity.y();  // LPS: +y is the patient's back
+    if ((prone && falls_back > 0) || (supine && falls_back < 0))
+      throw InputError(fmt::format(
+          "{}: the series was taken with the patient {} (patient position {}), but [pose.prone] gravity in case.toml "
+          "points to the patient's {}; choose the series of the prone examination, or correct gravity or frame",
+          folder.string(), prone ? "prone" : "supine", position, falls_back > 0 ? "back" : "front"));
+    if (position.empty()) run.warn("the series does not say how the patient lay (0018,5100)");
+    const std::string side = volume.series.laterality == "L" ? "left" : volume.series.laterality == "R" ? "right" : "";
+    if (!side.empty() && measured.side != side)
+      throw InputError(fmt::format("{}: the series shows the {} breast only (laterality {}), but case.side is \"{}\"",
+                                   folder.string(), side, volume.series.laterality, measured.side));
+    for (const auto& warning : volume.file.warnings) run.warn(warning);
+    return std::move(volume.file);
   }
 
   segmentation::Recipe find_recipe(const Case& measured, Run& run) const {
@@ -162,6 +200,30 @@ class SegmentTool : public Tool {
     return segmentation::dice(labels, segmentation::map_labels(volume.image, measured.labels, truth_file_).image);
   }
 
+  static void count_sides(const LabelImage& labels, Findings& findings) {
+    const auto sternum = std::find_if(findings.planes.begin(), findings.planes.end(),
+                                      [](const auto& plane) { return plane.name == "sternum"; });
+    if (sternum == findings.planes.end()) return;
+    const Grid& grid = labels.grid;
+    for (int k = 0; k < grid.size.z(); ++k)
+      for (int j = 0; j < grid.size.y(); ++j)
+        for (int i = 0; i < grid.size.x(); ++i) {
+          const bool right = grid.point(Eigen::Vector3d(i, j, k)).x() < sternum->at_mm;  // LPS: +x is the left
+          ++findings.sides[right][labels.at(i, j, k)];
+        }
+  }
+
+  static void fill_sides(Json& json, const Grid& grid, const Findings& findings) {
+    for (const auto& plane : findings.planes)
+      json["planes"][plane.name] = {
+          {"axis", std::string(1, plane.axis)}, {"at_mm", plane.at_mm}, {"given", plane.given}};
+    if (findings.planes.empty()) return;
+    for (int t = 0; t < tissue_count; ++t)
+      for (const int side : {0, 1})
+        json["sides_ml"][side == 0 ? "left" : "right"][std::string(tissue_names[t])] =
+            volume_ml(grid, findings.sides[side][t]);
+  }
+
   static void fill(Json& json, const Case& measured, const Grid& grid, const Findings& findings) {
     json["case"] = measured.name;
     json["kind"] = measured.image_kind;
@@ -176,6 +238,7 @@ class SegmentTool : public Tool {
     json["meshed_components"] = findings.components.meshed;
     json["meshed_volume_ml"] = volume_ml(grid, meshed(findings.voxels));
     if (!findings.recipe_log.empty()) json["recipe"] = findings.recipe_log;
+    fill_sides(json, grid, findings);
     if (!findings.dice) return;
     for (int t = 0; t < tissue_count; ++t)
       if (std::isfinite(findings.dice->tissue[t]))
@@ -197,8 +260,26 @@ class SegmentTool : public Tool {
     }
     run.say(fmt::format("{:<10}{:>12}{:>11.1f}{:>8}", "meshed", meshed(findings.voxels),
                         volume_ml(grid, meshed(findings.voxels)), findings.components.meshed));
+    if (!findings.planes.empty())
+      run.say(fmt::format("left breast {:.1f} ml (gland {:.1f}), right breast {:.1f} ml (gland {:.1f})",
+                          volume_ml(grid, meshed(findings.sides[0])), volume_ml(grid, findings.sides[0][2]),
+                          volume_ml(grid, meshed(findings.sides[1])), volume_ml(grid, findings.sides[1][2])));
     if (findings.dice) run.say(fmt::format("whole breast (adipose, gland, skin): Dice {:.4f}", findings.dice->breast));
     run.say(target.string());
+  }
+
+  void write_overlays(const LabelImage& labels, Run& run) const {
+    for (const auto& [axis, name] : {std::pair(0, "sagittal"), {1, "coronal"}, {2, "axial"}}) {
+      std::vector<double> places_mm;
+      const auto picture =
+          segmentation::overlay(labels, grey_.voxels.empty() ? nullptr : &grey_, axis, overlay_options_, places_mm);
+      const fs::path target = fs::path(overlay_folder_) / fmt::format("labels_{}.png", name);
+      segmentation::write_png(picture, run.output(target));
+      Json& json = run.figures(target);
+      json["axis"] = std::string(1, "xyz"[axis]);
+      json["slices_mm"] = places_mm;
+      json["columns"] = overlay_options_.columns;
+    }
   }
 
   static double volume_ml(const Grid& grid, std::size_t voxels) {
@@ -211,7 +292,9 @@ class SegmentTool : public Tool {
     return sum;
   }
 
-  std::string case_folder_, recipe_file_, truth_file_;
+  std::string case_folder_, recipe_file_, truth_file_, overlay_folder_;
+  segmentation::OverlayOptions overlay_options_;
+  GreyImage grey_;  ///< the volume as read, for the pictures; empty for kind = "labels"
 };
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "reconstruction/surface_io.h"
 #include "simulation/chain.h"
 #include "simulation/embedding.h"
+#include "simulation/linear_solver.h"
 
 namespace supine::pipeline {
 namespace {

@@ -8,6 +8,8 @@
 
 #include "common/error.h"
 #include "meshing/anatomy.h"
+#include "meshing/curve.h"
+#include "meshing/grade.h"
 #include "meshing/ligament_ring.h"
 #include "meshing/mesh_check.h"
 #include "meshing/mesh_io.h"
@@ -34,6 +36,7 @@ constexpr double good_cells_share = 0.25;  // how far --cells may be missed
 struct Findings {
   std::string side;
   QualityReport quality;
+  std::optional<meshing::CurveReport> curve;
   std::optional<meshing::FractionReport> fractions;
   std::optional<meshing::Anatomy> anatomy;
 };
@@ -50,6 +53,7 @@ class TetrahedraliseTool : public Tool {
            "Writes mesh.vtu (default: beside the surface).\n\n"
            "Examples:\n"
            "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --side left\n"
+           "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --order 2 --fine breast.vtp\n"
            "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --cells 20000 --order 2 -o fine.vtu\n"
            "  supine-tetrahedralise --check mesh.vtu\n";
   }
@@ -59,8 +63,22 @@ class TetrahedraliseTool : public Tool {
         ->required();
     app.add_option("muscle", muscle_, "breast-facing muscle sheet (.vtp)");
     app.add_option("labels", labels_, "label volume (.vti)");
-    app.add_option("--order", order_, "1: linear, 2: quadratic tetrahedra with straight edges")
-        ->check(CLI::IsMember({1, 2}));
+    app.add_option("--order", order_, "1: linear, 2: quadratic tetrahedra")->check(CLI::IsMember({1, 2}));
+    app.add_option(
+        "--fine", fine_,
+        "the surface before decimation (.vtp with regions): quadratic tetrahedra are bent onto it; without it "
+        "their edges are straight");
+    app.add_option("--skin-edge-mm", skin_edge_mm_,
+                   "edge length where skin and cut face meet, mm; 0 = as elsewhere on the surface");
+    app.add_option("--least-jacobian", curving_.least_jacobian,
+                   "scaled Jacobian every bent tetrahedron keeps, or else is bent less; between 0 and 1")
+        ->capture_default_str();
+    app.add_option("--fine-smooth", curving_.smooth_share,
+                   "neighbourhood of the fine surface a node follows, in mean edges around it, 0 to 2")
+        ->capture_default_str();
+    app.add_option("--muscle-reach-mm", curving_.muscle_reach_mm,
+                   "how far off the fine surface inner nodes follow the muscle's smooth distance, mm, >= 0")
+        ->capture_default_str();
     app.add_option("--cells", options_.cells, "about so many tetrahedra, 0 = as the surface's triangles suggest");
     app.add_option("--radius-edge", options_.radius_edge, "circumradius over shortest edge aimed at, 1.2 to 3");
     app.add_option("--min-dihedral", options_.min_dihedral_deg, "smallest dihedral angle aimed at, degrees, 0 to 18");
@@ -87,25 +105,44 @@ class TetrahedraliseTool : public Tool {
       throw InputError("three files are needed: SURFACE.vtp MUSCLE.vtp LABELS.vti (or --check MESH.vtu)");
     }
     run.stage("read");
-    const reconstruction::Surface surface = reconstruction::read_surface(run.input(surface_));
+    reconstruction::Surface surface = reconstruction::read_surface(run.input(surface_));
     const reconstruction::Surface muscle = reconstruction::read_surface(run.input(muscle_));
     const segmentation::LabelImage labels = segmentation::read_labels(run.input(labels_));
     findings.side = find_side();
     run.stage("tetrahedra");
     run.progress("filling the surface with tetrahedra");
-    TetMesh mesh = meshing::tetrahedralise(surface, options_, surface_);
+    meshing::TetrahedraliseOptions options = options_;
+    options.edge_mm = meshing::mean_edge_mm(surface);
+    if (skin_edge_mm_ != 0) surface = meshing::refine_skin_edge(surface, skin_edge_mm_);
+    TetMesh mesh = meshing::tetrahedralise(surface, options, surface_);
     mesh.muscle = muscle;
+    if (order_ == 2) mesh = meshing::to_quadratic(mesh);
+    bend(run, mesh, findings);
     run.stage("tissue");
     run.progress("reading tissue fractions from the labels");
     findings.fractions = meshing::assign_tissue(mesh, labels);
     run.stage("anatomy");
     run.progress("finding the foot of the mound");
     mark_ring(run, mesh, findings);
-    if (order_ == 2) mesh = meshing::to_quadratic(mesh);
     run.stage("check");
     meshing::check_mesh(mesh);
     findings.quality = meshing::measure_quality(mesh);
     return mesh;
+  }
+
+  void bend(Run& run, TetMesh& mesh, Findings& findings) const {
+    if (fine_.empty()) return;
+    if (order_ == 1) {
+      run.say("linear tetrahedra have straight edges: --fine is not used");
+      return;
+    }
+    run.stage("curve");
+    run.progress("bending the boundary onto the fine surface");
+    const reconstruction::Surface fine = reconstruction::read_surface(run.input(fine_));
+    Eigen::Matrix<double, 2, 3> box;
+    box << mesh.points.colwise().minCoeff(), mesh.points.colwise().maxCoeff();
+    const meshing::MuscleDistance muscle(mesh.muscle, box);
+    findings.curve = meshing::curve_boundary(mesh, fine, &muscle, curving_);
   }
 
   std::string find_side() const {
@@ -185,6 +222,28 @@ class TetrahedraliseTool : public Tool {
     return json;
   }
 
+  static Json curve_json(const meshing::CurveReport& c) {
+    const auto distance = [](const meshing::SurfaceDistance& d) {
+      return Json{{"mean_mm", d.mean_mm}, {"rms_mm", d.rms_mm}, {"max_mm", d.max_mm}};
+    };
+    Json json;
+    json["distance_before"] = distance(c.before);
+    json["distance_after"] = distance(c.after);
+    json["skin_distance_before"] = distance(c.skin_before);
+    json["skin_distance_after"] = distance(c.skin_after);
+    json["volume_ml"] = {{"before", c.volume_before_ml}, {"after", c.volume_after_ml}, {"fine", c.fine_volume_ml}};
+    json["boundary_corners"] = c.corners;
+    json["boundary_middles"] = c.middles;
+    json["corner_shift_max_mm"] = c.corner_shift_max_mm;
+    json["sagitta_mean_mm"] = c.sagitta_mean_mm;
+    json["sagitta_max_mm"] = c.sagitta_max_mm;
+    json["corners_pulled_back"] = c.corners_pulled_back;
+    json["middles_pulled_back"] = c.middles_pulled_back;
+    json["pulled_back_mean_mm"] = c.pulled_back_mean_mm;
+    json["pulled_back_max_mm"] = c.pulled_back_max_mm;
+    return json;
+  }
+
   void fill(Json& json, const Findings& findings) const {
     const QualityReport& q = findings.quality;
     json["order"] = order_;
@@ -212,7 +271,31 @@ class TetrahedraliseTool : public Tool {
     json["mean_radius_ratio"] = q.mean_radius_ratio;
     json["worst_cell"] = q.worst_cell;
     json["worst_place_mm"] = numbers(q.worst_place_mm);
+    if (order_ == 2) {
+      json["min_scaled_jacobian"] = q.min_scaled_jacobian;
+      json["mean_scaled_jacobian"] = q.mean_scaled_jacobian;
+      json["scaled_jacobian_histogram_tenths"] = q.scaled_jacobian;
+    }
+    if (findings.curve) json["curve"] = curve_json(*findings.curve);
     if (findings.anatomy) json["anatomy"] = anatomy_json(*findings.anatomy);
+  }
+
+  static void say_curve(const Run& run, const meshing::CurveReport& c) {
+    run.say(fmt::format(
+        "bent onto the fine surface: mean distance {:.3f} -> {:.3f} mm, max {:.2f} -> {:.2f} mm (skin: mean {:.3f} -> "
+        "{:.3f}, max {:.2f} -> {:.2f})",
+        c.before.mean_mm, c.after.mean_mm, c.before.max_mm, c.after.max_mm, c.skin_before.mean_mm, c.skin_after.mean_mm,
+        c.skin_before.max_mm, c.skin_after.max_mm));
+    run.say(
+        fmt::format("volume {:.2f} -> {:.2f} ml (fine surface {:.2f}); corners moved by up to {:.2f} mm, middles by "
+                    "{:.3f} mm on the mean, {:.2f} at most",
+                    c.volume_before_ml, c.volume_after_ml, c.fine_volume_ml, c.corner_shift_max_mm, c.sagitta_mean_mm,
+                    c.sagitta_max_mm));
+    run.say(
+        fmt::format("pulled back for the sake of the tetrahedra: {} of {} corners, {} of {} middles, by {:.3f} mm "
+                    "on the mean, {:.2f} at most",
+                    c.corners_pulled_back, c.corners, c.middles_pulled_back, c.middles, c.pulled_back_mean_mm,
+                    c.pulled_back_max_mm));
   }
 
   static void say(const Run& run, const Findings& findings) {
@@ -223,6 +306,10 @@ class TetrahedraliseTool : public Tool {
                         q.min_dihedral_deg, q.max_dihedral_deg, q.min_radius_ratio, q.mean_radius_ratio, q.inverted));
     run.say(fmt::format("worst tetrahedron {} at ({:.1f}, {:.1f}, {:.1f}) mm", q.worst_cell, q.worst_place_mm.x(),
                         q.worst_place_mm.y(), q.worst_place_mm.z()));
+    if (q.worst_jacobian_cell >= 0)
+      run.say(fmt::format("scaled Jacobian of the quadratic tetrahedra: min {:.3f} (tetrahedron {}), mean {:.3f}",
+                          q.min_scaled_jacobian, q.worst_jacobian_cell, q.mean_scaled_jacobian));
+    if (findings.curve) say_curve(run, *findings.curve);
     std::string histogram = "smallest angle per tetrahedron, 0-10-20-... degrees:";
     for (int i = 0; i < 8; ++i) histogram += fmt::format(" {}", q.smallest_dihedral[i]);
     run.say(histogram);
@@ -242,8 +329,10 @@ class TetrahedraliseTool : public Tool {
                         a.foot_radius_mm, a.rim_thickness_mm, a.mound_height_mm));
   }
 
-  std::string surface_, muscle_, labels_, side_;
+  std::string surface_, muscle_, labels_, side_, fine_;
   meshing::TetrahedraliseOptions options_;
+  meshing::CurveOptions curving_;
+  double skin_edge_mm_ = 0;
   int order_ = 1;
   bool check_ = false;
 };

@@ -157,13 +157,15 @@ InvariantResponse<T> invariant_response(BulkLaw law, const InvariantStrain& s, c
   return w;
 }
 
-/// What near-incompressibility averages over a cell (bulk.h): θ, and its first two derivatives with respect to L.
-struct Dilation {
-  double value, first, second;
+/// Energy of the volume ratio Ĵ of a whole cell, per unit of its modulus, and its derivatives: ln²Ĵ/2, (Ĵ - 1)²/2 for
+/// neo_hookean_calculix (bulk.h). @pre Ĵ > 0
+struct VolumeEnergy {
+  double energy, first, second;
 };
-inline Dilation dilation(BulkLaw law, const InvariantStrain& s) {
-  if (law == BulkLaw::neo_hookean_calculix) return {s.j - 1, s.j, s.j};
-  return {s.log_j, 1, 0};
+inline VolumeEnergy volume_energy(BulkLaw law, double ratio) {
+  if (law == BulkLaw::neo_hookean_calculix) return {0.5 * (ratio - 1) * (ratio - 1), ratio - 1, 1};
+  const double log_ratio = std::log(ratio);
+  return {0.5 * log_ratio * log_ratio, log_ratio / ratio, (1 - log_ratio) / (ratio * ratio)};
 }
 
 /// P = ∂W/∂F = 2 W1 F + W_L F^{-T} + 2 W2 (I1 F - F C).

@@ -34,7 +34,7 @@ Eigen::Matrix<T, 3, 3> corotated_stress(const Matrix3& f, const Matrix3& r, cons
   return p;
 }
 
-/// The polar law at one point. θ = tr U - 3 is what near-incompressibility averages over a cell (bulk.h).
+/// The polar law at one point. Its dilation θ = tr U - 3 is what is averaged over a cell (bulk.h).
 struct PolarPoint {
   Matrix3 f, r, u;  ///< F = R U
   double dilation;  ///< θ

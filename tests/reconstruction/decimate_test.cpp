@@ -5,6 +5,9 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
 
 #include "reconstruction/reconstruct.h"
 #include "reconstruction/surface_check.h"
@@ -128,6 +131,116 @@ TEST(Decimate, InputThatIsCoarseEnoughIsReturned) {
   EXPECT_TRUE(result.reached_target);
 }
 
+TEST(Decimate, QuadsAreNumberedAndMostOfTheFaces) {
+  const DecimateResult result = decimate(dome(), {.target_triangles = 1500});
+  ASSERT_EQ(result.quad.size(), result.surface.triangles.rows());
+  EXPECT_EQ(2 * result.quads + result.alone, result.surface.triangles.rows());
+  EXPECT_GT(result.quads, 9 * result.alone) << "at least nine faces of ten are quads";
+  EXPECT_LT(result.mean_deviation_deg, 20);
+  EXPECT_TRUE(result.fallback.empty());
+  std::vector<int> region(result.quads, -1);
+  for (Eigen::Index t = 0; t < result.quad.size(); ++t) {
+    if (result.quad(t) < 0) continue;
+    int& known = region[result.quad(t)];
+    if (known < 0) known = result.surface.region(t);
+    EXPECT_EQ(result.surface.region(t), known) << "a quad lies in one region";
+  }
+}
+
+TEST(Decimate, ByFacesAndByEdgeLength) {
+  const Surface in = ball(40, 5);
+  const DecimateResult faces = decimate(in, {.target_faces = 400});
+  EXPECT_NEAR((faces.quads + faces.alone) / 400.0, 1, 0.05);
+  const DecimateResult edges = decimate(in, {.edge_mm = 6});
+  EXPECT_NEAR(edges.edge_mm / 6, 1, 0.1);
+}
+
+TEST(Decimate, TrianglesOfOneSizeWhenAsked) {
+  const Surface in = ball(40, 4);
+  const DecimateOptions options{.target_triangles = 800, .method = DecimateMethod::triangles};
+  const DecimateResult result = decimate(in, options);
+  expect_promises(in, result, options);
+  EXPECT_EQ(result.quads, 0);
+  EXPECT_EQ(result.alone, result.surface.triangles.rows());
+}
+
+TEST(Decimate, OpenSurfaceKeepsItsBorderWhenAllowed) {
+  Surface in = ball(40, 5);
+  std::vector<int> kept;
+  for (int t = 0; t < in.triangles.rows(); ++t)
+    if (in.points(in.triangles(t, 0), 2) > -20) kept.push_back(t);
+  in.triangles = Triangles(in.triangles(kept, Eigen::all));  // points of the rest stay behind, used by none
+  const SurfaceReport before = check_surface(in);
+  const DecimateResult result = decimate(in, {.target_triangles = 900, .max_distance_mm = 1.5, .open = true});
+  const SurfaceReport after = check_surface(result.surface);
+  EXPECT_TRUE(after.manifold());
+  EXPECT_EQ(after.euler, before.euler);
+  EXPECT_GT(after.border_edges, 20);
+  // The border zigzags by the triangles of 2 mm that it was cut along.
+  EXPECT_LE(result.border_mm, 1.5);
+  EXPECT_LE(result.distance_mm, 1.5);
+}
+
+// A needle: a new point a thousandth of an edge away from it.
+void add_needle(Surface& s, int t) {
+  const Eigen::RowVector3d a = s.points.row(s.triangles(t, 0)), b = s.points.row(s.triangles(t, 1)),
+                           c = s.points.row(s.triangles(t, 2));
+  s.points.conservativeResize(s.points.rows() + 1, 3);
+  const auto p = static_cast<int>(s.points.rows()) - 1;
+  s.points.row(p) = 0.4995 * a + 0.4995 * b + 0.001 * c;
+  const Eigen::RowVector3i old = s.triangles.row(t);
+  const Eigen::Index n = s.triangles.rows();
+  s.triangles.conservativeResize(n + 2, 3);
+  s.triangles.row(t) << old(0), old(1), p;
+  s.triangles.row(n) << old(1), old(2), p;
+  s.triangles.row(n + 1) << old(2), old(0), p;
+}
+
+TEST(Decimate, NeedlesAreDecimatedAway) {
+  Surface in = ball(40, 4);
+  for (int t = 0; t < 400; t += 7) add_needle(in, t);
+  const DecimateOptions options{.target_triangles = 800};
+  const DecimateResult result = decimate(in, options);
+  expect_promises(in, result, options);
+  EXPECT_GT(result.smallest_angle_deg, 10);
+}
+
+TEST(Decimate, BrokenSurfacesAreRefusedWithTheirPlace) {
+  const Surface good = ball(10, 3);
+  const auto refusal = [&good](const std::function<void(Surface&)>& spoil) {
+    Surface bad = good;
+    spoil(bad);
+    return message_of([&bad] { decimate(bad, {.target_triangles = 300}); });
+  };
+  const auto expect_place = [](const std::string& message, const std::string& kind) {
+    EXPECT_NE(message.find(kind), std::string::npos) << message;
+    EXPECT_NE(message.find(") mm"), std::string::npos) << message;
+  };
+  expect_place(refusal([](Surface& s) { s.triangles.row(5).reverseInPlace(); }), "not a manifold");
+  expect_place(refusal([](Surface& s) {
+                 s.triangles.conservativeResize(s.triangles.rows() + 1, 3);
+                 s.triangles.row(s.triangles.rows() - 1) = s.triangles.row(7);
+               }),
+               "not a manifold");
+  expect_place(refusal([](Surface& s) {
+                 // Two sheets that touch in one point.
+                 const int p = s.triangles(0, 0);
+                 for (Eigen::Index t = s.triangles.rows() - 1; t > 0; --t)
+                   if ((s.points.row(s.triangles(t, 0)) + s.points.row(p)).norm() < 1e-6) {
+                     const int other = s.triangles(t, 0);
+                     for (Eigen::Index i = 0; i < s.triangles.size(); ++i)
+                       if (s.triangles.data()[i] == other) s.triangles.data()[i] = p;
+                     break;
+                   }
+               }),
+               "not a manifold");
+  expect_place(refusal([](Surface& s) { s.triangles.conservativeResize(s.triangles.rows() - 3, 3); }), "not closed");
+  expect_place(refusal([](Surface& s) { s.points.row(0) *= -1.5; }), "intersects itself");
+  EXPECT_NE(refusal([](Surface& s) { s.triangles.col(1).swap(s.triangles.col(2)); }).find("face inward"),
+            std::string::npos);
+  EXPECT_NE(refusal([](Surface& s) { s.triangles.resize(0, 3); }).find("no triangles"), std::string::npos);
+}
+
 TEST(Decimate, RefusesOpenAndCrossingSurfacesAndOptionsOutOfRange) {
   Surface open = ball(10, 3);
   open.triangles.conservativeResize(open.triangles.rows() - 1, 3);
@@ -137,6 +250,14 @@ TEST(Decimate, RefusesOpenAndCrossingSurfacesAndOptionsOutOfRange) {
   EXPECT_NE(message_of([&] { decimate(crossing, {}); }).find("intersects itself"), std::string::npos);
   EXPECT_NE(message_of([] { decimate(ball(10, 3), {.target_triangles = 3}); }).find("at least 100"), std::string::npos);
   EXPECT_NE(message_of([] { decimate(ball(10, 3), {.max_distance_mm = 0}); }).find("must be > 0"), std::string::npos);
+  EXPECT_NE(message_of([] { decimate(ball(10, 3), {.target_faces = 7}); }).find("at least 50"), std::string::npos);
+  EXPECT_NE(message_of([] { decimate(ball(10, 3), {.edge_mm = -1}); }).find("must be > 0"), std::string::npos);
+  EXPECT_NE(message_of([] { decimate(ball(10, 3), {.relative_size = Eigen::VectorXd::Ones(3)}); }).find("one each"),
+            std::string::npos);
+  EXPECT_NE(message_of([] {
+              decimate(ball(10, 3), {.relative_size = Eigen::VectorXd::Zero(ball(10, 3).points.rows())});
+            }).find("must lie in"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -97,9 +97,16 @@ TEST_F(ImageRefusal, SkewAxes) {
 }
 
 TEST_F(ImageRefusal, NearlyOrthonormalAxesAreMadeExact) {
-  write_text(folder_ / "a.nrrd", nrrd("4 4 4", "(1,0,0) (0.0005,1,0) (0,0,1)"));
+  std::string text = nrrd("4 4 4", "(1,0,0) (0.0005,1,0) (0,0,1)");
+  text.back() = 'y';  // a volume of one value is refused
+  write_text(folder_ / "a.nrrd", text);
   const Eigen::Matrix3d d = read_image(folder_ / "a.nrrd", "").image.grid.direction;
   EXPECT_NEAR((d.transpose() * d - Eigen::Matrix3d::Identity()).norm(), 0, 1e-14);
+}
+
+TEST_F(ImageRefusal, VolumeOfOneValue) {
+  write_text(folder_ / "a.nrrd", nrrd("4 4 4", "(1,0,0) (0,1,0) (0,0,1)"));
+  expect_refused("a.nrrd", "every voxel is 120");
 }
 
 TEST_F(ImageRefusal, ColourAndFourAxes) {

@@ -81,6 +81,24 @@ TEST(RecipeToml, ReadsEveryKindOfStep) {
     mask = "a"
     tissue = "gland"
     over = ["adipose", "skin"]
+    [[step]]
+    do = "body"
+    mask = "a"
+    lower = 40
+    [[step]]
+    do = "chest"
+    mask = "a"
+    body = "b"
+    border = "line"
+    sternum_mm = 3
+    [[step]]
+    do = "planes"
+    mask = "a"
+    body = "b"
+    chest = "c"
+    side = "left"
+    mid_axillary_mm = 70
+    inframammary_offset_mm = -5
   )");
   ASSERT_EQ(recipe.steps.size(), std::variant_size_v<Step>);
   for (std::size_t s = 0; s < recipe.steps.size(); ++s) EXPECT_EQ(recipe.steps[s].index(), s);
@@ -92,6 +110,11 @@ TEST(RecipeToml, ReadsEveryKindOfStep) {
   EXPECT_EQ(grow.confidence->multiplier, 2);
   EXPECT_EQ(std::get<Combine>(recipe.steps[7]).any, (std::vector<std::string>{"b", "c"}));
   EXPECT_EQ(std::get<Region>(recipe.steps[10]).half_mm, Eigen::Vector3d(4, 5, 6));
+  EXPECT_EQ(std::get<Body>(recipe.steps[12]).lower, 40);
+  EXPECT_EQ(std::get<Chest>(recipe.steps[13]).options.border, ChestWallOptions::Border::line);
+  EXPECT_EQ(std::get<Chest>(recipe.steps[13]).sternum_mm, 3);
+  EXPECT_EQ(std::get<Planes>(recipe.steps[14]).mid_axillary.at_mm, 70);
+  EXPECT_EQ(std::get<Planes>(recipe.steps[14]).inframammary.offset_mm, -5);
   EXPECT_EQ(std::get<Paint>(recipe.steps[11]).over, (std::vector<Tissue>{Tissue::adipose, Tissue::skin}));
 }
 
@@ -117,7 +140,14 @@ TEST(RecipeToml, RefusesStepsWithKeyValueAndBound) {
   expect_refused("do = \"noise_floor\"\nair_below = 0", {"air_below: 0", "> 0"});
   expect_refused("do = \"noise_floor\"\nair_below = \"60\"", {"air_below", "number"});
   expect_refused("do = \"noise_floor\"\nair_below = 6\nsigma = 1", {"line 4", "sigma: unknown key", "air_below"});
-  expect_refused("do = \"bias\"", {"lower: missing"});
+  expect_refused("do = \"body\"\nmask = \"a\"\nlower = 5\nair = 6", {"air: 6 is above lower = 5"});
+  expect_refused("do = \"body\"\nmask = \"a\"\nedge_share = 1", {"edge_share: 1", "<= 0.9"});
+  expect_refused("do = \"chest\"\nmask = \"a\"\nbody = \"b\"\nborder = \"edge\"", {"border: \"edge\"", "line, step"});
+  expect_refused("do = \"chest\"\nmask = \"a\"\nbody = \"b\"\ndark = 70\nbright = 60", {"bright: 60", "dark = 70"});
+  expect_refused("do = \"chest\"\nmask = \"a\"", {"body: missing"});
+  expect_refused("do = \"planes\"\nmask = \"a\"\nbody = \"b\"\nchest = \"c\"\nside = \"up\"", {"side: \"up\"", "both"});
+  expect_refused("do = \"planes\"\nmask = \"a\"\nbody = \"b\"\nchest = \"c\"\nsuperior_mm = 1\nsuperior_offset_mm = 2",
+                 {"superior_offset_mm: has no effect"});
   expect_refused("do = \"bias\"\nlower = 1\ndegree = 5", {"degree: 5", "<= 4"});
   expect_refused("do = \"bias\"\nlower = 1\ndegree = 1.5", {"degree", "whole"});
   expect_refused("do = \"threshold\"\nmask = \"a\"\nlower = 5\nupper = 4", {"lower: 5 is above upper = 4"});

@@ -120,6 +120,27 @@ TEST(Ligament, ActsOnTheFootAlone) {
   EXPECT_GT(inside, 10);
 }
 
+TEST(Ligament, ArcsLeaveTheRightPartOut) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  const auto share = [&](const std::string& arc) {
+    Model model = testing::soft_model();
+    model.effects.push_back({"ligament", {{"stiffness_kpa_per_mm", Setting{1}}}, {{"arc", arc}}});
+    const auto fields = values_of(make_fields(model, {scene.mesh, scene.anatomy, layout, "supine"}, {0, 1, 0}));
+    const Eigen::VectorXd added = fields.interface_normal.array() - model.interface.normal_kpa_per_mm.value;
+    for (Eigen::Index p = 0; p < added.size(); ++p) {
+      const auto q = layout.interface.q.row(p);
+      if ((arc == "lower" && q.y() > 0) || (arc == "open_medial" && q.x() < -0.51 * q.norm())) {
+        EXPECT_LT(std::abs(added[p]), 1e-12);
+      }
+    }
+    return added.dot(layout.interface.area_mm2);
+  };
+  const double full = share("full");
+  EXPECT_NEAR(share("lower") / full, 1.0 / 2, 0.1);
+  EXPECT_NEAR(share("open_medial") / full, 2.0 / 3, 0.1);
+}
+
 TEST(Ligament, RigidTieReproducesTheStudysCompliance) {
   const testing::TestScene& scene = testing::dome_scene();
   const Layout layout = make_layout(scene.mesh, scene.anatomy);

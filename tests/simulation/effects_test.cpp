@@ -19,11 +19,9 @@ using meshing::TetMesh;
 const std::vector<PoseLoad> box_poses = {{"prone", {0.2, 0, std::sqrt(1 - 0.04)}},
                                          {"supine", -Eigen::Vector3d::UnitZ()}};
 
-EffectSetting effect(const std::string& name, const std::map<std::string, double>& values,
-                     const std::map<std::string, std::string>& options = {}) {
+EffectSetting effect(const std::string& name, const std::map<std::string, double>& values) {
   EffectSetting setting = null_setting(*find_effect(name));
   for (const auto& [key, value] : values) setting.parameters.at(key).value = value;
-  for (const auto& [key, value] : options) setting.options.at(key) = value;
   return setting;
 }
 
@@ -339,27 +337,6 @@ TEST(SegmentationOffset, ChangesTheWeightWithTheImagedVolume) {
   double weight = 0;
   for (Eigen::Index n = 0; n < X.rows(); ++n) weight -= sums.residual[3 * n + 1];
   EXPECT_NEAR(weight, 1e-6 * gravity_mm_s2 * swollen, 1e-9 * weight);
-}
-
-TEST(Ligament, ArcsLeaveTheRightPartOut) {
-  const testing::TestScene& scene = testing::dome_scene();
-  const Layout layout = make_layout(scene.mesh, scene.anatomy);
-  const auto share = [&](const std::string& arc) {
-    Model model = testing::soft_model();
-    model.effects = {effect("ligament", {{"stiffness_kpa_per_mm", 1}}, {{"arc", arc}})};
-    const auto fields = values_of(make_fields(model, {scene.mesh, scene.anatomy, layout, "supine"}, {0, 1, 0}));
-    const Eigen::VectorXd added = fields.interface_normal.array() - model.interface.normal_kpa_per_mm.value;
-    for (Eigen::Index p = 0; p < added.size(); ++p) {
-      const auto q = layout.interface.q.row(p);
-      if ((arc == "lower" && q.y() > 0) || (arc == "open_medial" && q.x() < -0.51 * q.norm())) {
-        EXPECT_LT(std::abs(added[p]), 1e-12);
-      }
-    }
-    return added.dot(layout.interface.area_mm2);
-  };
-  const double full = share("full");
-  EXPECT_NEAR(share("lower") / full, 1.0 / 2, 0.1);
-  EXPECT_NEAR(share("open_medial") / full, 2.0 / 3, 0.1);
 }
 
 struct Refusal {

@@ -52,11 +52,12 @@ TEST_P(PatchTest, AffineMapWithARotationIsSolvedExactly) {
   if (keeps_volume) affine *= std::cbrt(1.002 / affine.determinant());  // as such tissue does
   const Points X = scene.mesh.points, exact = X * affine.transpose();
   Points x = exact;
-  const double start = keeps_volume ? 0.04 : 0.8;  // mm; full Newton steps, so not too far in stiff tissue
+  // mm; full Newton steps, so not too far in stiff tissue and in small elements
+  const double start = keeps_volume ? 0.01 : GetParam().order == 2 ? 0.3 : 0.8;
   const Eigen::MatrixXd noise = random_matrix(nodes, 3, 5);
   for (int n = 0; n < nodes; ++n)
     if (!on_boundary[n]) x.row(n) += start * noise.row(n);
-  ASSERT_GT((x - exact).norm(), 0.1);
+  ASSERT_GT((x - exact).norm(), 0.05);
 
   Sums sums(mechanics.pattern());
   for (int iteration = 0; iteration < 12; ++iteration) {
@@ -82,6 +83,16 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{1, BulkLaw::yeoh}, Case{1, BulkLaw::gent}, Case{1, BulkLaw::neo_hookean_calculix},
                       Case{2, BulkLaw::mooney_rivlin}, Case{2, BulkLaw::neo_hookean, 0.499},
                       Case{2, BulkLaw::neo_hookean_calculix, 0.499}, Case{2, BulkLaw::corotational, 0.499}));
+
+// Whatever laws there are, on every element they go with.
+std::vector<Case> every_law() {
+  std::vector<Case> cases;
+  for (const auto& [name, law] : bulk_law_names())
+    for (const int order : {1, 2})
+      if (order == 1 || law != BulkLaw::corotational_qr) cases.push_back(Case{order, law});
+  return cases;
+}
+INSTANTIATE_TEST_SUITE_P(EveryLaw, PatchTest, ::testing::ValuesIn(every_law()));
 
 // A column that hangs from z = 0 under its own weight. With ν = 0 the neo-Hookean law leaves its width alone and
 // μ (F - 1/F) = ρ g (L - Z), so that F = (s + √(s² + 4))/2 with s = ρ g (L - Z)/μ.

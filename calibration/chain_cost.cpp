@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "calibration/chain_cost.h"
+
+#include <cmath>
+#include <limits>
+
+#include "common/error.h"
+
+namespace supine::calibration {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+int prior_count(const FreeParameters& parameters, const FitOptions& options) {
+  if (!options.use_priors) return 0;
+  int count = 0;
+  for (const auto& prior : parameters.priors()) count += prior.has_value();
+  return count;
+}
+
+}  // namespace
+
+ChainCost::ChainCost(Evaluator& evaluator, const FreeParameters& parameters, const FitOptions& options, PointMask mask,
+                     Fit& log, int start)
+    : evaluator_(evaluator),
+      parameters_(parameters),
+      options_(options),
+      mask_(std::move(mask)),
+      log_(log),
+      start_(start),
+      best_rms_mm_(std::numeric_limits<double>::infinity()) {
+  Eigen::Index points = 0;
+  for (const auto& used : mask_) points += used.count();
+  set_num_residuals(static_cast<int>(points) + prior_count(parameters, options));
+  mutable_parameter_block_sizes()->push_back(static_cast<int>(parameters.size()));
+}
+
+void ChainCost::warm_start(const Eigen::VectorXd& u, const Prediction& prediction, const Linearisation* linearisation) {
+  accepted_.u = u;
+  accepted_.prediction = prediction;
+  if (linearisation != nullptr) accepted_.linearisation = *linearisation;
+  trial_ = accepted_;
+  trial_.residuals = residuals_of(evaluator_.scene(), prediction, mask_, options_.noise_mm);
+  if (linearisation == nullptr) note(u, false);
+}
+
+bool ChainCost::predict(const Eigen::VectorXd& u) const {
+  if (trial_.u.size() == u.size() && trial_.u == u) return true;
+  ++log_.evaluations;
+  try {
+    const bool warm = accepted_.u.size() == u.size();
+    simulation::ChainSolution near;
+    if (warm) near = extrapolated(accepted_.prediction.solution, accepted_.linearisation.by_coordinate, u - accepted_.u);
+    trial_.prediction = evaluator_.predict(parameters_.model(u), warm ? &near : nullptr);
+  } catch (const NumericalFailure&) {
+    ++log_.failed;
+    note(u, true);
+    return false;
+  }
+  trial_.u = u;
+  trial_.residuals = residuals_of(evaluator_.scene(), trial_.prediction, mask_, options_.noise_mm);
+  note(u, false);
+  return true;
+}
+
+void ChainCost::note(const Eigen::VectorXd& u, bool failed) const {
+  const Eigen::VectorXd& d = trial_.residuals.distance_mm;
+  const double count = static_cast<double>(d.size());
+  FitEvaluation row{parameters_.values(u), nan, nan, nan, failed, false, start_};
+  if (!failed) {
+    row.mae_study_mm = trial_.prediction.mae_study_mm();
+    row.mae_mm = d.cwiseAbs().sum() / count;
+    row.rms_mm = std::sqrt(d.squaredNorm() / count);
+    best_rms_mm_ = std::min(best_rms_mm_, row.rms_mm);
+  }
+  log_.history.push_back(row);
+  if (options_.progress) options_.progress({log_.evaluations, log_.failed, row.rms_mm, best_rms_mm_});
+}
+
+void ChainCost::fill(const Eigen::VectorXd& u, double* residuals) const {
+  const Residuals& r = trial_.residuals;
+  for (Eigen::Index i = 0; i < r.size(); ++i)
+    residuals[i] = robust_residual(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i];
+  Eigen::Index row = r.size();
+  for (Eigen::Index j = 0; j < u.size() && row < num_residuals(); ++j)
+    if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)])
+      residuals[row++] = (u[j] - prior->mean) / prior->sd;
+}
+
+bool ChainCost::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
+  const Eigen::VectorXd u = Eigen::Map<const Eigen::VectorXd>(parameters[0], parameters_.size());
+  if (!predict(u)) return false;
+  fill(u, residuals);
+  if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+  const simulation::Model model = parameters_.model(u);
+  const simulation::Sensitivities sensitivities(evaluator_.chain(), model, trial_.prediction.solution);
+  trial_.linearisation = linearise(evaluator_, sensitivities, parameters_, u, trial_.prediction, trial_.residuals);
+  accepted_ = trial_;
+  if (!log_.history.empty()) log_.history.back().accepted = true;
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> jacobian(
+      jacobians[0], num_residuals(), parameters_.size());
+  jacobian.setZero();
+  const Residuals& r = accepted_.residuals;
+  for (Eigen::Index i = 0; i < r.size(); ++i)
+    jacobian.row(i) = accepted_.linearisation.slope.row(i) *
+                      (robust_slope(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i]);
+  Eigen::Index row = r.size();
+  for (Eigen::Index j = 0; j < u.size() && row < num_residuals(); ++j)
+    if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)]) jacobian(row++, j) = 1 / prior->sd;
+  return true;
+}
+
+}  // namespace supine::calibration

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "calibration/evaluator_pool.h"
+
+#include <omp.h>
+
+#include <exception>
+#include <optional>
+
+#include "common/error.h"
+#include "simulation/parameters.h"
+
+namespace supine::calibration {
+
+EvaluatorPool::EvaluatorPool(const Scene& scene, const FreeParameters& parameters, simulation::ChainSolution reference,
+                             int threads)
+    : parameters_(parameters), reference_(std::move(reference)) {
+  for (int t = 0; t < std::max(1, threads); ++t)
+    evaluators_.push_back(std::make_unique<Evaluator>(scene, parameters.base()));
+}
+
+RunResult EvaluatorPool::evaluate(Evaluator& evaluator, const Eigen::VectorXd& values) const {
+  simulation::Model model = parameters_.base();
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    simulation::find_setting(model, parameters_.names()[static_cast<std::size_t>(i)])->value = values[i];
+  try {
+    const Prediction prediction = evaluator.predict(model, &reference_);
+    const DistanceFigures figures = figures_of(prediction.scan_distances());
+    return {false, prediction.mae_study_mm(), figures.mae_mm, figures.rms_mm};
+  } catch (const NumericalFailure&) {
+    return {};
+  }
+}
+
+std::vector<RunResult> EvaluatorPool::run(const std::vector<Eigen::VectorXd>& values, RunJournal& journal,
+                                          const std::function<void(const RunResult&)>& done) {
+  std::vector<RunResult> results(values.size());
+  std::exception_ptr failure;
+#pragma omp parallel for schedule(dynamic) num_threads(static_cast<int>(evaluators_.size()))
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (const auto known = journal.find(values[i])) {
+      results[i] = *known;
+      continue;
+    }
+    try {
+      results[i] = evaluate(*evaluators_[static_cast<std::size_t>(omp_get_thread_num())], values[i]);
+      journal.add(values[i], results[i]);
+#pragma omp critical(supine_pool_done)
+      if (done) done(results[i]);
+    } catch (...) {
+#pragma omp critical(supine_pool_failure)
+      failure = std::current_exception();
+    }
+  }
+  if (failure) std::rethrow_exception(failure);
+  return results;
+}
+
+}  // namespace supine::calibration

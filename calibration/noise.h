@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/arrays.h"
+
+namespace supine::calibration {
+
+/// Scanner noise along the normal, 1 sigma, from what the signed distances do between neighbouring points: each of up
+/// to 3000 points against the plane through the distances of its 16 neighbours, median absolute deviation. What
+/// varies over more than a few points (the model's error) cancels; so does noise that neighbouring points share,
+/// which makes this a lower bound for scanners that smooth.
+/// @param place        #R by 3, mm
+/// @param distance_mm  #R, signed
+/// @throws InputError  fewer than 40 points
+double estimate_noise_mm(const Points& place, const Eigen::VectorXd& distance_mm);
+
+}  // namespace supine::calibration

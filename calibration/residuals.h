@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "calibration/evaluator.h"
+
+namespace supine::calibration {
+
+/// Which scan points take part, per measurement.
+using PointMask = std::vector<Eigen::Array<bool, Eigen::Dynamic, 1>>;
+
+/// The scan points that lie over the model's skin, not beyond its border.
+PointMask points_over_skin(const Prediction& prediction);
+
+/// The measurement as one vector: the signed distances of the points that take part, pose after pose.
+struct Residuals {
+  Eigen::VectorXd distance_mm;  ///< #R, > 0 where the scan lies outside the model
+  Eigen::VectorXd sigma_mm;     ///< #R, of the scanner along the normal
+  Points place;                 ///< #R by 3, the scan points
+  Table q;                      ///< #R by 2, anatomy coordinates of the closest skin point
+  Eigen::VectorXi pose;         ///< #R, row of Scene::measurements
+  Eigen::VectorXi point;        ///< #R, row of its scan
+
+  Eigen::Index size() const { return distance_mm.size(); }
+};
+
+/// @param noise_mm  per measurement
+Residuals residuals_of(const Scene& scene, const Prediction& prediction, const PointMask& mask,
+                       const std::vector<double>& noise_mm);
+
+/// Columns ∂d/∂u of the residuals with respect to the coordinates of some parameters, and how the shapes move.
+struct Linearisation {
+  Eigen::MatrixXd slope;                               ///< #R by #parameters, mm per coordinate
+  std::vector<simulation::ChainDerivative> by_coordinate;  ///< per coordinate
+};
+
+/// @param sensitivities  of the prediction's solution
+Linearisation linearise(Evaluator& evaluator, const simulation::Sensitivities& sensitivities,
+                        const FreeParameters& parameters, const Eigen::VectorXd& u, const Prediction& prediction,
+                        const Residuals& residuals);
+
+/// ∂d/∂(parameter value) at the residuals' points.
+Eigen::VectorXd slope_at(Evaluator& evaluator, const simulation::Model& model, const Prediction& prediction,
+                         const Residuals& residuals, const std::string& parameter,
+                         const simulation::ChainDerivative& derivative);
+
+}  // namespace supine::calibration

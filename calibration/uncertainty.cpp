@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "calibration/uncertainty.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace supine::calibration {
+namespace {
+
+constexpr double told_apart = 0.95;
+constexpr double open_sd = 1e3;
+constexpr double quantile = 1.959964;
+
+double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
+
+Eigen::MatrixXd prior_information(const FreeParameters& parameters, bool use_priors) {
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters.size(), parameters.size());
+  for (Eigen::Index i = 0; use_priors && i < parameters.size(); ++i)
+    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(i)])
+      information(i, i) = 1 / (prior->sd * prior->sd);
+  return information;
+}
+
+/// Information with a little added where there is none: along such a direction the variance becomes open_sd².
+struct Closed {
+  Eigen::MatrixXd inverse, added;
+
+  explicit Closed(const Eigen::MatrixXd& information) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+    const Eigen::VectorXd values = eigen.eigenvalues().cwiseMax(1 / (open_sd * open_sd));
+    const Eigen::MatrixXd& v = eigen.eigenvectors();
+    inverse = v * values.cwiseInverse().asDiagonal() * v.transpose();
+    added = v * (values - eigen.eigenvalues()).asDiagonal() * v.transpose();
+  }
+  Eigen::MatrixXd sandwich(const Eigen::MatrixXd& spread) const { return inverse * (spread + added) * inverse; }
+};
+
+std::vector<Uncertainty::Pair> twins(const Eigen::MatrixXd& covariance, const FreeParameters& parameters) {
+  std::vector<Uncertainty::Pair> pairs;
+  const auto& names = parameters.names();
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i)
+    for (Eigen::Index j = i + 1; j < covariance.rows(); ++j) {
+      const double correlation = covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
+      if (std::abs(correlation) > told_apart)
+        pairs.push_back({names[static_cast<std::size_t>(i)], names[static_cast<std::size_t>(j)], correlation});
+    }
+  return pairs;
+}
+
+}  // namespace
+
+Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_priors) {
+  const Eigen::MatrixXd& j = fit.linearisation.slope;
+  const double tau = rms(fit.residuals.distance_mm), precision = 1 / (tau * tau);
+  Uncertainty result;
+  result.errors = fit_error_model(fit.residuals, j);
+  result.effective_points = result.errors.effective_count(fit.residuals);
+  const Eigen::MatrixXd priors = prior_information(parameters, use_priors);
+  const Eigen::MatrixXd data = precision * (j.transpose() * j);
+  const Eigen::MatrixXd spread = precision * precision * weighted_product(result.errors, fit.residuals, j, j);
+  const Closed closed(data + priors);
+  result.white = closed.inverse;
+  result.covariance = closed.sandwich(spread + priors);
+  result.singular = Eigen::JacobiSVD<Eigen::MatrixXd>(j / tau).singularValues();
+  result.rank = static_cast<int>((result.singular.array() > 1e-6 * result.singular[0]).count());
+  result.not_told_apart = twins(Closed(data).sandwich(spread), parameters);
+  return result;
+}
+
+std::vector<Interval> linear_intervals(const Fit& fit, const FreeParameters& parameters,
+                                       const Uncertainty& uncertainty) {
+  std::vector<Interval> intervals;
+  for (Eigen::Index i = 0; i < parameters.size(); ++i) {
+    const double reach = quantile * std::sqrt(uncertainty.covariance(i, i));
+    intervals.push_back({parameters.value(i, std::max(fit.u[i] - reach, parameters.lower()[i])),
+                         parameters.value(i, std::min(fit.u[i] + reach, parameters.upper()[i]))});
+  }
+  return intervals;
+}
+
+}  // namespace supine::calibration

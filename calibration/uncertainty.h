@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calibration/error_model.h"
+#include "calibration/least_squares.h"
+
+namespace supine::calibration {
+
+/// What a fit is worth, linearised at its optimum.
+struct Uncertainty {
+  ErrorModel errors;
+  double effective_points;     ///< independent points the scan is worth under `errors`
+  Eigen::MatrixXd covariance;  ///< of the coordinates u, under correlated errors (sandwich)
+  Eigen::MatrixXd white;       ///< the same if every point erred by itself with the residuals' rms: too small
+  Eigen::VectorXd singular;    ///< of the slopes over the residuals' rms, descending: 1 / sd of each direction
+  int rank;                    ///< directions that the points determine at all (relative to the largest, 1e-6)
+  /// Parameters that move together (|correlation| > 0.95 from the data alone), with their correlation.
+  struct Pair {
+    std::string first, second;
+    double correlation;
+  };
+  std::vector<Pair> not_told_apart;
+};
+
+/// With H = JᵀJ/τ² + P the information of points (rms τ) and priors, and V = JᵀΣJ/τ⁴ + P its true variance:
+/// covariance = H⁻¹ V H⁻¹ (Huber, White). Directions the data leave open and no prior closes get a standard deviation
+/// of 1e3 coordinates.
+Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_priors);
+
+/// An interval of a parameter's value.
+struct Interval {
+  double low, high;
+};
+
+/// value at u ± 1.96 sd, cut at the range.
+std::vector<Interval> linear_intervals(const Fit& fit, const FreeParameters& parameters,
+                                       const Uncertainty& uncertainty);
+
+/// 95 % profile intervals: where twice the cost, minimised over all other parameters, has risen by 3.84 times the
+/// parameter's ratio of covariance to white (Chandler and Bate 2007, Pace et al. 2011), both in units of the
+/// residuals' rms. Cut at the range. Falls back to the linear end where the chain finds no equilibrium on the way.
+/// @param runs  chain runs it took, added to
+std::vector<Interval> profile_intervals(Evaluator& evaluator, const FreeParameters& parameters,
+                                        const FitOptions& options, const Fit& fit, const Uncertainty& uncertainty,
+                                        int& runs);
+
+}  // namespace supine::calibration

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/candidates.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "simulation/parameters.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using simulation::Effect;
+using simulation::Parameter;
+
+constexpr double unfelt_mm = 1e-6;  // rms movement of the fitted points at the typical size
+
+bool has(const simulation::Model& model, const Effect& effect) {
+  return std::any_of(model.effects.begin(), model.effects.end(),
+                     [&effect](const simulation::EffectSetting& s) { return s.name == effect.name(); });
+}
+
+double typical_size(const Parameter& row) {
+  const double size = std::abs(row.median - row.null);
+  return size > 0 ? size : row.log_sd;
+}
+
+}  // namespace
+
+std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const simulation::Model& model,
+                                       const calibration::Fit& fit, std::vector<std::string>& unseen) {
+  const simulation::Sensitivities sensitivities(evaluator.chain(), model, fit.prediction.solution);
+  std::vector<Candidate> candidates;
+  for (const Effect* effect : simulation::catalogue()) {
+    if (has(model, *effect)) continue;
+    Candidate candidate{effect->name(), {}, Eigen::MatrixXd(fit.residuals.size(), 0)};
+    for (const Parameter& row : effect->parameters()) {
+      const std::string name = simulation::parameter_name(*effect, row);
+      const Eigen::VectorXd slope = calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, name,
+                                                          sensitivities.of(name));
+      const double rms = slope.norm() / std::sqrt(static_cast<double>(slope.size()));
+      if (!(rms * typical_size(row) > unfelt_mm)) continue;
+      candidate.parameters.push_back({name, row.unit, row.null, row.lower, row.upper, typical_size(row), row.one_sided});
+      candidate.slope.conservativeResize(Eigen::NoChange, candidate.slope.cols() + 1);
+      candidate.slope.col(candidate.slope.cols() - 1) = slope;
+    }
+    if (candidate.parameters.empty())
+      unseen.push_back(effect->name());
+    else
+      candidates.push_back(std::move(candidate));
+  }
+  return candidates;
+}
+
+}  // namespace supine::diagnosis

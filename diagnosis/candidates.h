@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "calibration/least_squares.h"
+
+namespace supine::diagnosis {
+
+/// One parameter of a candidate.
+struct CandidateParameter {
+  std::string name;  ///< as in parameters.h
+  std::string unit;
+  double null, lower, upper;
+  double typical;  ///< size that is usual: the catalogue's median, or its spread where no sign is likelier
+  bool one_sided;
+};
+
+/// An effect that the model does not have, and what the measured distances would do if it had it.
+struct Candidate {
+  std::string effect;
+  std::vector<CandidateParameter> parameters;
+  Eigen::MatrixXd slope;  ///< ∂d/∂(parameter) at its null, #R by #parameters, mm per unit; through both solves
+};
+
+/// Every effect of the catalogue that is not in the model and that the fitted points can feel. Parameters that change
+/// nothing at the null (the place of a ligament of no stiffness) are left out.
+/// @param unseen  out: effects of the catalogue that move no fitted point, here or anywhere
+std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const simulation::Model& model,
+                                       const calibration::Fit& fit, std::vector<std::string>& unseen);
+
+}  // namespace supine::diagnosis

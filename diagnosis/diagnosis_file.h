@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include "calibration/residuals.h"
+#include "diagnosis/candidates.h"
+
+namespace supine::diagnosis {
+
+/// Writes the fitted scan points with the point arrays `distance_mm`, `pose` (row of the field data `poses`) and, per
+/// candidate, `shape_<effect>_mm`: the change of distance that the effect at its one-step size would make, its
+/// parameters in the order of the table. Field data `frame` = LPS, `unit` = mm. Same input, same bytes.
+/// @param shapes  per candidate, #R
+/// @throws InputError  when the file cannot be written
+void write_diagnosis(const calibration::Residuals& residuals, const std::vector<std::string>& poses,
+                     const std::vector<std::pair<std::string, Eigen::VectorXd>>& shapes,
+                     const std::filesystem::path& file);
+
+}  // namespace supine::diagnosis

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/score_test.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "calibration/held_out.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::Residuals;
+
+constexpr double same_direction = 0.9;
+constexpr double implausible = 3;
+constexpr int null_draws = 1000;
+
+double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
+
+double normal_above(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
+
+/// Orthonormal basis of the column space.
+Eigen::MatrixXd basis(const Eigen::MatrixXd& columns) {
+  if (columns.cols() == 0) return columns;
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(columns, Eigen::ComputeThinU);
+  return svd.matrixU().leftCols(svd.rank());
+}
+
+/// A candidate in whitened space, freed of what recalibration can absorb.
+struct Projected {
+  Eigen::MatrixXd slope;      // M S̃
+  Eigen::MatrixXd direction;  // orthonormal
+  bool one_sided;
+};
+
+class Scorer {
+ public:
+  Scorer(const Residuals& residuals, const Eigen::MatrixXd& slope, const std::vector<Candidate>& candidates,
+         const Whitening& whitening)
+      : residuals_(residuals), slope_(slope), candidates_(candidates), log_points_(std::log(whitening.effective_points())) {
+    const Eigen::MatrixXd absorbed = basis(whitening.apply(slope));
+    const auto freed = [&absorbed](const Eigen::MatrixXd& a) -> Eigen::MatrixXd {
+      return a - absorbed * (absorbed.transpose() * a);
+    };
+    distance_ = freed(whitening.apply(residuals.distance_mm));
+    for (const Candidate& candidate : candidates) {
+      Projected p{freed(whitening.apply(candidate.slope)), {}, false};
+      p.direction = basis(p.slope);
+      p.one_sided = candidate.parameters.size() == 1 && candidate.parameters[0].one_sided;
+      projected_.push_back(std::move(p));
+    }
+    blocks_ = calibration::spatial_blocks(residuals);
+  }
+
+  Score score(std::size_t c) const {
+    const Candidate& candidate = candidates_[c];
+    const Projected& p = projected_[c];
+    Score score{};
+    score.effect = candidate.effect;
+    score.freedom = static_cast<int>(p.direction.cols());
+    const auto solver = p.slope.completeOrthogonalDecomposition();
+    score.step = -solver.solve(distance_);
+    const Eigen::MatrixXd inverse = solver.pseudoInverse();
+    score.step_sd = inverse.rowwise().norm();
+    for (Eigen::Index k = 0; k < score.step.size(); ++k) {
+      const CandidateParameter& parameter = candidate.parameters[static_cast<std::size_t>(k)];
+      score.step[k] += parameter.null;
+      const double range = score.step[k] > parameter.null ? parameter.upper : parameter.lower;
+      score.beyond_range |= std::abs(score.step[k] - parameter.null) > implausible * std::abs(range - parameter.null);
+    }
+    score.wrong_sign = p.one_sided && score.step[0] < candidate.parameters[0].null;
+    score.statistic = score.wrong_sign ? 0 : (p.direction.transpose() * distance_).squaredNorm();
+    score.bic = score.statistic - score.freedom * log_points_;
+    predict(candidate, score);
+    expect(candidate, p, score);
+    return score;
+  }
+
+  /// b of the best candidate for pure noise.
+  std::vector<double> null_maxima(unsigned seed) const {
+    std::vector<double> maxima(null_draws);
+    std::mt19937_64 generator(seed);
+    std::normal_distribution<double> normal;
+    Eigen::VectorXd z(distance_.size());
+    for (double& best : maxima) {
+      for (double& number : z) number = normal(generator);
+      best = -1e300;
+      for (const Projected& p : projected_) {
+        const bool wrong = p.one_sided && p.slope.col(0).dot(z) > 0;
+        const double t = wrong ? 0 : (p.direction.transpose() * z).squaredNorm();
+        best = std::max(best, t - static_cast<double>(p.direction.cols()) * log_points_);
+      }
+    }
+    return maxima;
+  }
+
+  double correlation(std::size_t a, std::size_t b) const {
+    const Eigen::MatrixXd product = projected_[a].direction.transpose() * projected_[b].direction;
+    return Eigen::JacobiSVD<Eigen::MatrixXd>(product).singularValues()[0];
+  }
+
+  double held_out_rms(const Eigen::VectorXd& distance, const Eigen::MatrixXd& slope) const {
+    Residuals moved = residuals_;
+    moved.distance_mm = distance;
+    return rms(calibration::held_out_distances(moved, slope, Eigen::VectorXd::Zero(slope.cols()), blocks_));
+  }
+
+ private:
+  /// Errors after the joint linear step that a calibration would make (every point counts once), the candidate's part
+  /// cut at its bounds.
+  void predict(const Candidate& candidate, Score& score) const {
+    Eigen::MatrixXd both(slope_.rows(), slope_.cols() + candidate.slope.cols());
+    both << slope_, candidate.slope;
+    Eigen::VectorXd d = residuals_.distance_mm;
+    const Eigen::VectorXd step = -both.completeOrthogonalDecomposition().solve(d);
+    for (Eigen::Index k = 0; k < candidate.slope.cols(); ++k) {
+      const CandidateParameter& parameter = candidate.parameters[static_cast<std::size_t>(k)];
+      const double wanted = parameter.null + step[slope_.cols() + k];
+      d += candidate.slope.col(k) * (std::clamp(wanted, parameter.lower, parameter.upper) - parameter.null);
+    }
+    d -= slope_ * slope_.completeOrthogonalDecomposition().solve(d);
+    score.predicted_rms_mm = rms(d);
+    score.predicted_held_out_rms_mm = held_out_rms(d, both);
+  }
+
+  void expect(const Candidate& candidate, const Projected& p, Score& score) const {
+    double sum = 0;
+    for (Eigen::Index k = 0; k < p.slope.cols(); ++k)
+      sum += p.slope.col(k).squaredNorm() * std::pow(candidate.parameters[static_cast<std::size_t>(k)].typical, 2);
+    score.noncentrality = sum / static_cast<double>(p.slope.cols());
+    score.power = chi_squared_power(score.freedom, score.noncentrality);
+  }
+
+  const Residuals& residuals_;
+  const Eigen::MatrixXd& slope_;
+  const std::vector<Candidate>& candidates_;
+  double log_points_;
+  Eigen::VectorXd distance_;
+  std::vector<Projected> projected_;
+  Eigen::VectorXi blocks_;
+};
+
+}  // namespace
+
+double chi_squared_power(int freedom, double lambda) {
+  const double q = freedom, c = 2 / (9 * q);
+  const double quantile = q * std::pow(1 - c + 1.644854 * std::sqrt(c), 3);
+  const double a = q + lambda, b = q + 2 * lambda;
+  const double h = 1 - 2 * a * (q + 3 * lambda) / (3 * b * b), p = b / (a * a), m = (h - 1) * (1 - 3 * h);
+  const double mean = 1 + h * p * (h - 1 - 0.5 * (2 - h) * m * p), sd = h * std::sqrt(2 * p) * (1 + 0.5 * m * p);
+  return normal_above((std::pow(quantile / a, h) - mean) / sd);
+}
+
+ScoreTable score_candidates(const Residuals& residuals, const Eigen::MatrixXd& slope,
+                            const std::vector<Candidate>& candidates, const Whitening& whitening, unsigned seed) {
+  const Scorer scorer(residuals, slope, candidates, whitening);
+  ScoreTable table;
+  table.base_rms_mm = rms(residuals.distance_mm);
+  table.base_held_out_rms_mm = scorer.held_out_rms(residuals.distance_mm, slope);
+  table.effective_points = whitening.effective_points();
+  const std::vector<double> maxima = scorer.null_maxima(seed);
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    Score score = scorer.score(c);
+    const auto higher = std::count_if(maxima.begin(), maxima.end(), [&score](double b) { return b >= score.bic; });
+    score.p_value = static_cast<double>(1 + higher) / static_cast<double>(1 + maxima.size());
+    for (std::size_t other = 0; other < candidates.size(); ++other)
+      if (other != c && scorer.correlation(c, other) > same_direction)
+        score.not_told_apart_from.push_back(candidates[other].effect);
+    table.scores.push_back(std::move(score));
+  }
+  std::stable_sort(table.scores.begin(), table.scores.end(),
+                   [](const Score& a, const Score& b) { return a.bic > b.bic; });
+  return table;
+}
+
+}  // namespace supine::diagnosis

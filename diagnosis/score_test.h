@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "diagnosis/candidates.h"
+#include "diagnosis/whitening.h"
+
+namespace supine::diagnosis {
+
+/// What the measurement says of one candidate, from the fitted model alone (no refit).
+struct Score {
+  std::string effect;
+  double statistic;         ///< T: fall of the whitened sum of squares, recalibration allowed for
+  int freedom;              ///< q: directions tested
+  double bic;               ///< b = T − q ln n_eff
+  double p_value;           ///< that the best candidate of all scores as high as this one without any effect
+  Eigen::VectorXd step;     ///< one-step value of each parameter, in its unit
+  Eigen::VectorXd step_sd;  ///< its standard deviation
+  bool wrong_sign;          ///< one-sided, and the step goes to the other side: T = 0
+  bool beyond_range;        ///< a step leaves three times the range from null to bound: right shape, implausible amount
+  double predicted_rms_mm;  ///< of all points after the joint linear step, steps cut at the bounds
+  double predicted_held_out_rms_mm;  ///< the same, every block of skin predicted without itself
+  double noncentrality;     ///< λ at the typical size: under 9 this scan cannot see the effect
+  double power;             ///< chance to find the effect at its typical size, alone and at 5 %
+  std::vector<std::string> not_told_apart_from;  ///< candidates with a canonical correlation above 0.9
+};
+
+struct ScoreTable {
+  std::vector<Score> scores;  ///< best first
+  double base_rms_mm;
+  double base_held_out_rms_mm;
+  double effective_points;
+};
+
+/// Projected score test (Rao's; Lagrange multiplier) of every candidate. With d̃ = L⁻¹d, S̃ = L⁻¹S and Q an orthonormal
+/// basis of what recalibration can absorb, M = I − QQᵀ:
+///   T = ‖P(M S̃) M d̃‖²,   φ̂ = φ⁰ − (M S̃)⁺ M d̃;   T = 0 where a one-sided φ̂ is below its null.
+/// p: max over all candidates of b under d̃ ~ N(0, I), 1000 seeded draws (Westfall and Young). It is as good as Σ:
+/// with white noise it calls every mesh error an effect.
+/// @param slope  ∂d/∂u of the fitted parameters, #R by #parameters
+ScoreTable score_candidates(const calibration::Residuals& residuals, const Eigen::MatrixXd& slope,
+                            const std::vector<Candidate>& candidates, const Whitening& whitening, unsigned seed);
+
+/// Chance that a χ² of @p freedom degrees and noncentrality @p lambda exceeds its central 95 % quantile
+/// (Sankaran 1963; quantile by Wilson and Hilferty 1931); within 0.01.
+double chi_squared_power(int freedom, double lambda);
+
+}  // namespace supine::diagnosis

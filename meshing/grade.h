@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include "reconstruction/surface.h"
+
+namespace supine::meshing {
+
+/// Remeshes a surface so that its edges are shorter where skin and cut face meet: there the skin's tension passes into
+/// the tissue and its hold within a few mm, and this sets how far the breast slides as a whole. Edges grow step by
+/// step, doubling over about four of their lengths, to the mean edge of @p surface elsewhere.
+/// @param surface  closed manifold with regions
+/// @param edge_mm  edge length on that border, > 0; the nearest of mean edge / 2, / 4 and / 8 is taken
+/// @return the same surface, regions and topology; @p surface itself where edge_mm is not below 0.71 of its mean edge,
+/// or
+///   where there is no such border
+/// @throws InputError  edge_mm <= 0
+reconstruction::Surface refine_skin_edge(const reconstruction::Surface& surface, double edge_mm);
+
+}  // namespace supine::meshing

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "meshing/triangle_tree.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <numeric>
+
+namespace supine::meshing {
+namespace {
+constexpr int leaf_size = 4;
+constexpr int deepest = 64;
+}  // namespace
+
+Eigen::Vector3d closest_weights(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& abc) {
+  const Eigen::Vector3d ab = abc[1] - abc[0], ac = abc[2] - abc[0], ap = p - abc[0];
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
+  if (d1 <= 0 && d2 <= 0) return {1, 0, 0};
+  const Eigen::Vector3d bp = p - abc[1];
+  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
+  if (d3 >= 0 && d4 <= d3) return {0, 1, 0};
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+    const double v = d1 - d3 > 0 ? d1 / (d1 - d3) : 0;
+    return {1 - v, v, 0};
+  }
+  const Eigen::Vector3d cp = p - abc[2];
+  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
+  if (d6 >= 0 && d5 <= d6) return {0, 0, 1};
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+    const double w = d2 - d6 > 0 ? d2 / (d2 - d6) : 0;
+    return {1 - w, 0, w};
+  }
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const double sum = (d4 - d3) + (d5 - d6), w = sum > 0 ? (d4 - d3) / sum : 0;
+    return {0, 1 - w, w};
+  }
+  const double sum = va + vb + vc;
+  return {va / sum, vb / sum, vc / sum};
+}
+
+TriangleTree::TriangleTree(const Points& points, const Triangles& triangles) : order_(triangles.rows()) {
+  const auto count = static_cast<int>(triangles.rows());
+  std::vector<Eigen::AlignedBox3d> boxes(count);
+  Points centres(count, 3);
+  for (int t = 0; t < count; ++t) {
+    for (int c = 0; c < 3; ++c) boxes[t].extend(points.row(triangles(t, c)).transpose());
+    centres.row(t) = boxes[t].center().transpose();
+  }
+  std::iota(order_.begin(), order_.end(), 0);
+  nodes_.reserve(count);
+  nodes_.emplace_back();
+  split(0, 0, count, centres, boxes);
+  corners_.resize(count);
+  for (int i = 0; i < count; ++i)
+    for (int c = 0; c < 3; ++c) corners_[i][c] = points.row(triangles(order_[i], c)).transpose();
+}
+
+void TriangleTree::split(int node, int first, int last, const Points& centres,
+                         const std::vector<Eigen::AlignedBox3d>& boxes) {
+  Eigen::AlignedBox3d box, middle;
+  for (int i = first; i < last; ++i) {
+    box.extend(boxes[order_[i]]);
+    middle.extend(centres.row(order_[i]).transpose());
+  }
+  nodes_[node] = {box, first, last - first};
+  if (last - first <= leaf_size) return;
+  int axis = 0;
+  middle.sizes().maxCoeff(&axis);
+  const int half = (first + last) / 2;
+  std::nth_element(order_.begin() + first, order_.begin() + half, order_.begin() + last, [&](int a, int b) {
+    return centres(a, axis) != centres(b, axis) ? centres(a, axis) < centres(b, axis) : a < b;
+  });
+  const auto child = static_cast<int>(nodes_.size());
+  nodes_.resize(nodes_.size() + 2);
+  nodes_[node].first = child;
+  nodes_[node].count = 0;
+  split(child, first, half, centres, boxes);
+  split(child + 1, half, last, centres, boxes);
+}
+
+TriangleTree::Hit TriangleTree::closest(const Eigen::Vector3d& at, double within_mm) const {
+  Hit best;
+  best.squared_mm2 = within_mm * within_mm;
+  std::array<std::pair<int, double>, deepest> stack;
+  int top = 0;
+  stack[top++] = {0, nodes_[0].box.squaredExteriorDistance(at)};
+  while (top > 0) {
+    const auto [index, distance] = stack[--top];
+    if (distance > best.squared_mm2) continue;
+    const Node& node = nodes_[index];
+    if (node.count == 0) {
+      double near = nodes_[node.first].box.squaredExteriorDistance(at);
+      double far = nodes_[node.first + 1].box.squaredExteriorDistance(at);
+      int first = node.first, second = node.first + 1;
+      if (far < near) {
+        std::swap(near, far);
+        std::swap(first, second);
+      }
+      if (far <= best.squared_mm2) stack[top++] = {second, far};
+      if (near <= best.squared_mm2) stack[top++] = {first, near};
+      continue;
+    }
+    for (int i = node.first; i < node.first + node.count; ++i) {
+      const auto& abc = corners_[i];
+      const Eigen::Vector3d weights = closest_weights(at, abc);
+      const Eigen::Vector3d point = weights[0] * abc[0] + weights[1] * abc[1] + weights[2] * abc[2];
+      const double squared = (point - at).squaredNorm();
+      // Ties go to the lower number, so that the answer does not depend on the order of the walk.
+      if (squared < best.squared_mm2 || (squared == best.squared_mm2 && order_[i] < best.triangle))
+        best = {order_[i], point, weights, squared};
+    }
+  }
+  return best;
+}
+
+std::vector<TriangleTree::Hit> TriangleTree::closest(const Points& at) const {
+  std::vector<Hit> hits(at.rows());
+#pragma omp parallel for schedule(dynamic, 512)
+  for (Eigen::Index p = 0; p < at.rows(); ++p) hits[p] = closest(Eigen::Vector3d(at.row(p)));
+  return hits;
+}
+
+Eigen::VectorXd TriangleTree::distances_mm(const Points& at) const {
+  Eigen::VectorXd result(at.rows());
+#pragma omp parallel for schedule(dynamic, 512)
+  for (Eigen::Index p = 0; p < at.rows(); ++p) result(p) = std::sqrt(closest(Eigen::Vector3d(at.row(p))).squared_mm2);
+  return result;
+}
+
+std::vector<int> TriangleTree::overlapping(const Eigen::AlignedBox3d& box) const {
+  std::vector<int> found, stack{0};
+  while (!stack.empty()) {
+    const Node& node = nodes_[stack.back()];
+    stack.pop_back();
+    if (!node.box.intersects(box)) continue;
+    if (node.count == 0) {
+      stack.push_back(node.first);
+      stack.push_back(node.first + 1);
+      continue;
+    }
+    for (int i = node.first; i < node.first + node.count; ++i) {
+      Eigen::AlignedBox3d own;
+      for (const Eigen::Vector3d& corner : corners_[i]) own.extend(corner);
+      if (own.intersects(box)) found.push_back(order_[i]);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+}  // namespace supine::meshing

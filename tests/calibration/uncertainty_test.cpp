@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "calibration/uncertainty.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <random>
+
+#include "tests/calibration/twin.h"
+
+namespace supine::calibration {
+namespace {
+
+using supine::testing::Twin;
+using supine::testing::twin_start;
+using supine::testing::twin_truth;
+
+struct Fitted {
+  explicit Fitted(const simulation::Model& start, double noise_mm = 0.7)
+      : twin({twin_truth(), noise_mm}), parameters(start), evaluator(twin.scene(), start) {
+    options.noise_mm = {noise_mm};
+    fit = fit_least_squares(evaluator, parameters, options);
+  }
+  Twin twin;
+  FreeParameters parameters;
+  Evaluator evaluator;
+  FitOptions options;
+  Fit fit;
+};
+
+TEST(Uncertainty, IntervalsHoldTheTruthAsOftenAsTheySayUnderWhiteNoise) {
+  Fitted f(twin_truth());
+  const Eigen::MatrixXd j = f.fit.linearisation.slope;
+  const auto solver = j.colPivHouseholderQr();
+  std::mt19937 generator(5);
+  std::normal_distribution<double> normal(0, 0.7);
+  constexpr int draws = 60;
+  Eigen::Vector2i held = Eigen::Vector2i::Zero();
+  for (int draw = 0; draw < draws; ++draw) {
+    Fit noisy = f.fit;
+    Eigen::VectorXd noise(j.rows());
+    for (double& number : noise) number = normal(generator);
+    const Eigen::VectorXd step = -solver.solve(noise);
+    noisy.u = f.fit.u + step;
+    noisy.residuals.distance_mm = noise + j * step;
+    const Uncertainty worth = judge(noisy, f.parameters, false);
+    for (int p = 0; p < 2; ++p) held[p] += std::abs(step[p]) < 1.96 * std::sqrt(worth.covariance(p, p));
+  }
+  // 95 % of 60 = 57, binomial sd 1.7: four of them. More draws: bench/interval_coverage.cpp.
+  for (int p = 0; p < 2; ++p) EXPECT_GE(held[p], 50) << p;
+  EXPECT_LT(held.sum(), 120);  // not because the intervals are endless
+}
+
+TEST(Uncertainty, SharedErrorsWidenTheIntervals) {
+  Fitted f(twin_truth());
+  Fit shared = f.fit;
+  // A wave of 0.7 mm over the skin that the parameters do not make.
+  for (Eigen::Index i = 0; i < shared.residuals.size(); ++i)
+    shared.residuals.distance_mm[i] += 0.7 * std::sin(shared.residuals.place(i, 0) / 8) *
+                                       std::cos(shared.residuals.place(i, 2) / 8);
+  const Uncertainty alone = judge(f.fit, f.parameters, false), together = judge(shared, f.parameters, false);
+  EXPECT_GT(together.errors.spread_mm, alone.errors.spread_mm + 0.2);
+  EXPECT_GT(together.covariance(0, 0), 2 * together.white(0, 0));
+  EXPECT_LT(together.effective_points, 0.9 * alone.effective_points);
+}
+
+TEST(Uncertainty, ModulusAndThicknessOfTheSkinCannotBeToldApart) {
+  simulation::Model start = twin_truth();
+  start.skin.thickness_mm = {1.5, true, {}, 0.3, 5};
+  Fitted f(start);
+  const Uncertainty worth = judge(f.fit, f.parameters, false);
+  EXPECT_EQ(worth.rank, 2);
+  bool found = false;
+  for (const auto& pair : worth.not_told_apart)
+    found |= pair.first == "skin.young_modulus_kpa" && pair.second == "skin.thickness_mm" && pair.correlation < -0.99;
+  EXPECT_TRUE(found);
+}
+
+TEST(Uncertainty, ProfileOfAWellMeasuredParameterIsTheLinearInterval) {
+  simulation::Model start = twin_start();
+  start.skin.young_modulus_kpa.free = false;
+  start.skin.young_modulus_kpa.value = 25;
+  Fitted f(start);
+  const Uncertainty worth = judge(f.fit, f.parameters, false);
+  const auto linear = linear_intervals(f.fit, f.parameters, worth);
+  int runs = 0;
+  const auto profile = profile_intervals(f.evaluator, f.parameters, f.options, f.fit, worth, runs);
+  EXPECT_GT(runs, 1);
+  const double width = linear[0].high - linear[0].low;
+  EXPECT_NEAR(profile[0].low, linear[0].low, 0.1 * width);
+  EXPECT_NEAR(profile[0].high, linear[0].high, 0.1 * width);
+  EXPECT_LT(linear[0].low, 0.9);
+  EXPECT_GT(linear[0].high, 0.9);
+}
+
+TEST(Uncertainty, ProfileOfTwoHoldsTheTruth) {
+  Fitted f(twin_start());
+  const Uncertainty worth = judge(f.fit, f.parameters, false);
+  int runs = 0;
+  const auto profile = profile_intervals(f.evaluator, f.parameters, f.options, f.fit, worth, runs);
+  EXPECT_LT(profile[0].low, 0.9);
+  EXPECT_GT(profile[0].high, 0.9);
+  EXPECT_LT(profile[1].low, 25);
+  EXPECT_GT(profile[1].high, 25);
+}
+
+}  // namespace
+}  // namespace supine::calibration

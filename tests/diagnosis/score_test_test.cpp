@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/score_test.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <random>
+
+#include "common/error.h"
+#include "diagnosis/diagnose.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::Residuals;
+
+/// Points on a sheet, white noise of 0.5 mm.
+Residuals sheet(unsigned seed, int count = 600) {
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> uniform(-60, 60);
+  std::normal_distribution<double> normal(0, 0.5);
+  Residuals r;
+  r.place.resize(count, 3);
+  r.distance_mm.resize(count);
+  for (int i = 0; i < count; ++i) {
+    r.place.row(i) << uniform(generator), uniform(generator), 0;
+    r.distance_mm[i] = normal(generator);
+  }
+  r.q = r.place.leftCols<2>() / 60;
+  r.sigma_mm = Eigen::VectorXd::Constant(count, 0.5);
+  r.pose = Eigen::VectorXi::Zero(count);
+  r.point = Eigen::VectorXi::LinSpaced(count, 0, count - 1);
+  return r;
+}
+
+Eigen::MatrixXd fitted_slopes(const Residuals& r) {
+  Eigen::MatrixXd slope(r.size(), 2);
+  slope.col(0).setOnes();
+  slope.col(1) = r.place.col(0) / 40;
+  return slope;
+}
+
+Candidate candidate(const std::string& name, const Eigen::MatrixXd& slope, bool one_sided = false) {
+  Candidate c{name, {}, slope};
+  for (Eigen::Index k = 0; k < slope.cols(); ++k)
+    c.parameters.push_back({name + ".p" + std::to_string(k), "1", 0, one_sided ? 0.0 : -2.0, 2, 0.5, one_sided});
+  return c;
+}
+
+/// Shapes that recalibration cannot make.
+std::vector<Candidate> catalogue_of(const Residuals& r) {
+  const Eigen::ArrayXd x = r.place.col(0).array() / 20, y = r.place.col(1).array() / 20;
+  Eigen::MatrixXd two(r.size(), 2);
+  two << x.cos().matrix(), (2 * y).sin().matrix();
+  return {candidate("wave", y.sin().matrix()), candidate("pair", two),
+          candidate("ring", (-(x * x + y * y) / 2).exp().matrix(), true)};
+}
+
+const Score& score_of(const ScoreTable& table, const std::string& effect) {
+  for (const Score& score : table.scores)
+    if (score.effect == effect) return score;
+  throw InputError(effect);
+}
+
+/// Weighted sum of squares after a fit of these columns.
+double left_over(const Residuals& r, const Eigen::MatrixXd& columns) {
+  const Eigen::VectorXd d = r.distance_mm - columns * columns.colPivHouseholderQr().solve(r.distance_mm);
+  return d.squaredNorm() / (0.5 * 0.5);
+}
+
+TEST(ScoreTest, StatisticIsTheFallOfTheSumOfSquares) {
+  const Residuals r = sheet(1);
+  const auto candidates = catalogue_of(r);
+  const ScoreTable table =
+      score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  for (const Candidate& c : candidates) {
+    if (score_of(table, c.effect).wrong_sign) continue;
+    Eigen::MatrixXd both(r.size(), 2 + c.slope.cols());
+    both << fitted_slopes(r), c.slope;
+    const double fall = left_over(r, fitted_slopes(r)) - left_over(r, both);
+    EXPECT_NEAR(score_of(table, c.effect).statistic, fall, 1e-8 * (1 + fall)) << c.effect;
+  }
+}
+
+TEST(ScoreTest, FindsWhatIsThereWithItsSizeAndTheFallItPredicts) {
+  Residuals r = sheet(2);
+  const auto candidates = catalogue_of(r);
+  r.distance_mm -= 0.6 * candidates[0].slope;  // the model lacks 0.6 of "wave": the scan lies where it would bring it
+  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const Score& best = table.scores.front();
+  EXPECT_EQ(best.effect, "wave");
+  EXPECT_NEAR(best.step[0], 0.6, 4 * best.step_sd[0]);
+  EXPECT_LT(best.step_sd[0], 0.05);
+  EXPECT_LT(best.p_value, 0.002);
+  EXPECT_NEAR(best.predicted_rms_mm, 0.5, 0.03);
+  EXPECT_LT(best.predicted_held_out_rms_mm, 0.95 * table.base_held_out_rms_mm);
+}
+
+TEST(ScoreTest, AOneSidedEffectOfTheWrongSignScoresNothing) {
+  Residuals r = sheet(3);
+  const auto candidates = catalogue_of(r);
+  r.distance_mm += 0.6 * candidates[2].slope;
+  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const Score& ring = score_of(table, "ring");
+  EXPECT_TRUE(ring.wrong_sign);
+  EXPECT_EQ(ring.statistic, 0);
+  EXPECT_LT(ring.step[0], 0);
+  r.distance_mm -= 1.2 * candidates[2].slope;
+  const ScoreTable right = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  EXPECT_EQ(right.scores.front().effect, "ring");
+}
+
+TEST(ScoreTest, WhatRecalibrationAbsorbsScoresNothing) {
+  Residuals r = sheet(4);
+  r.distance_mm += 3 * fitted_slopes(r).col(1);
+  const ScoreTable before = score_candidates(sheet(4), fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
+  const ScoreTable after = score_candidates(r, fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
+  for (const Score& score : before.scores)
+    EXPECT_NEAR(score.statistic, score_of(after, score.effect).statistic, 1e-7);
+}
+
+TEST(ScoreTest, FalseAlarmsComeAtTheirRate) {
+  int alarms = 0;
+  constexpr int trials = 200;
+  for (int trial = 0; trial < trials; ++trial) {
+    const Residuals r = sheet(100 + static_cast<unsigned>(trial), 200);
+    const ScoreTable table = score_candidates(r, fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
+    alarms += table.scores.front().p_value < 0.05;
+  }
+  EXPECT_GE(alarms, 1);   // 10 expected, binomial sd 3.1
+  EXPECT_LE(alarms, 22);  // four of them above
+}
+
+TEST(ScoreTest, SameDirectionIsNotToldApart) {
+  const Residuals r = sheet(5);
+  auto candidates = catalogue_of(r);
+  candidates.push_back(candidate("twin", candidates[0].slope + 0.1 * candidates[1].slope.col(0)));
+  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  EXPECT_EQ(score_of(table, "wave").not_told_apart_from, std::vector<std::string>{"twin"});
+  EXPECT_TRUE(score_of(table, "ring").not_told_apart_from.empty());
+}
+
+TEST(ScoreTest, PowerIsThatOfTheNoncentralChiSquared) {
+  // Central: 5 %. λ with a power of 80 % (tables of the noncentral χ²): 7.849 (q = 1), 9.635 (2), 10.903 (3), 13.624 (6).
+  for (const int q : {1, 2, 3, 6}) EXPECT_NEAR(chi_squared_power(q, 0), 0.05, 0.01) << q;
+  EXPECT_NEAR(chi_squared_power(1, 7.849), 0.8, 0.01);
+  EXPECT_NEAR(chi_squared_power(2, 9.635), 0.8, 0.01);
+  EXPECT_NEAR(chi_squared_power(3, 10.903), 0.8, 0.01);
+  EXPECT_NEAR(chi_squared_power(6, 13.624), 0.8, 0.01);
+}
+
+TEST(Whitening, CorrelatedErrorsBecomeIndependent) {
+  const Residuals r = sheet(6, 300);
+  const calibration::ErrorModel errors{0.4, 0.9, 25};
+  const Whitening whitening = Whitening::correlated(r, errors);
+  const calibration::Clusters& clusters = whitening.clusters();
+  const Eigen::Index n = clusters.members.size();
+  ASSERT_LE(n, 300);
+  EXPECT_EQ(clusters.members.sum(), 300);
+  Eigen::MatrixXd sigma(n, n);  // of the cluster means
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j)
+      sigma(i, j) = 0.81 * std::exp(-(clusters.place.row(i) - clusters.place.row(j)).norm() / 25) +
+                    (i == j ? 0.16 / clusters.members[i] : 0);
+  // Columns over the points whose cluster means are those of Σ.
+  Eigen::MatrixXd by_point(300, n);
+  for (int i = 0; i < 300; ++i) by_point.row(i) = sigma.row(clusters.of_point[i]);
+  const Eigen::MatrixXd half = whitening.apply(by_point);  // L⁻¹ Σ = Lᵀ
+  EXPECT_LT((half.transpose() * half - sigma).norm(), 1e-9 * sigma.norm());
+}
+
+Score named(const std::string& effect, double bic, double p, double held_out) {
+  Score score{};
+  score.effect = effect, score.bic = bic, score.p_value = p, score.predicted_held_out_rms_mm = held_out;
+  return score;
+}
+
+TEST(Decide, NamesTheOneThatStandsOut) {
+  const ScoreTable table{{named("ligament", 60, 0.001, 0.8), named("adhesion", 20, 0.001, 0.95)}, 1.3, 1.4, 100};
+  const FirstDiagnosis result = decide(table, table, {}, 0.7);
+  EXPECT_EQ(result.verdict, Verdict::missing);
+  EXPECT_EQ(result.missing, std::vector<std::string>{"ligament"});
+}
+
+TEST(Decide, NamesAllThatDoAsWellMeasurementFirst) {
+  const ScoreTable table{{named("adhesion", 60, 0.001, 0.8), named("misregistration", 57, 0.001, 0.8)}, 1.3, 1.4, 100};
+  const FirstDiagnosis result = decide(table, table, {}, 0.7);
+  EXPECT_EQ(result.verdict, Verdict::ambiguous);
+  EXPECT_EQ(result.missing, (std::vector<std::string>{"misregistration", "adhesion"}));
+}
+
+TEST(Decide, DoesNotNameWhatTheHeldOutErrorDoesNotConfirm) {
+  const ScoreTable table{{named("ligament", 60, 0.001, 1.38)}, 1.3, 1.4, 100};
+  EXPECT_EQ(decide(table, table, {}, 0.7).verdict, Verdict::unexplained);
+  const ScoreTable floor{{named("ligament", 60, 0.001, 0.72)}, 0.7, 0.72, 100};
+  EXPECT_EQ(decide(floor, floor, {}, 0.7).verdict, Verdict::nothing_missing);
+}
+
+TEST(Decide, NamesNothingByChance) {
+  const ScoreTable table{{named("ligament", 3, 0.2, 0.8)}, 1.3, 1.4, 100};
+  EXPECT_EQ(decide(table, table, {}, 0.7).verdict, Verdict::nothing_missing);
+}
+
+Refit refit(const std::string& effect, double held_out) {
+  Refit r;
+  r.effect = effect, r.solved = true, r.held_out_rms_mm = r.rms_mm = held_out;
+  return r;
+}
+
+TEST(Decide, RefitsOverruleLinearPredictions) {
+  const ScoreTable table{{named("adhesion", 60, 0.001, 0.8), named("ligament", 30, 0.001, 1.38)}, 1.3, 1.4, 100};
+  const FirstDiagnosis result = decide(table, table, {}, {refit("adhesion", 1.1), refit("ligament", 0.8)}, 0.7);
+  EXPECT_EQ(result.verdict, Verdict::missing);
+  EXPECT_EQ(result.missing, std::vector<std::string>{"ligament"});
+  const FirstDiagnosis both = decide(table, table, {}, {refit("adhesion", 0.81), refit("ligament", 0.8)}, 0.7);
+  EXPECT_EQ(both.verdict, Verdict::ambiguous);
+  EXPECT_EQ(decide(table, table, {}, {refit("adhesion", 1.39)}, 0.7).verdict, Verdict::unexplained);
+}
+
+TEST(Decide, RefitsTheFirstOfEitherTable) {
+  const ScoreTable a{{named("adhesion", 60, 0, 0), named("ligament", 30, 0, 0), named("creep", 3, 0, 0)}, 1, 1, 1};
+  const ScoreTable b{{named("friction", 60, 0, 0), named("ligament", 30, 0, 0), named("creep", 3, 0, 0)}, 1, 1, 1};
+  EXPECT_EQ(worth_refitting(a, b, 2), (std::vector<std::string>{"adhesion", "ligament", "friction"}));
+}
+
+}  // namespace
+}  // namespace supine::diagnosis
