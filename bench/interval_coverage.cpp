@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 //
 // How often the 95 % intervals of a calibration hold the truth: at the fit of a case, errors are drawn (noise of single
-// points alone, then with an error that neighbouring points share), the parameters are estimated by one linear step, the
-// interval is made from what is left, as after any fit, and asked whether it holds the truth. The naive interval
+// points alone, then with an error that neighbouring points share), the parameters are estimated by one linear step,
+// the interval is made from what is left, as after any fit, and asked whether it holds the truth. The naive interval
 // (every point errs by itself) stands beside it.
 //
 //   bench_interval_coverage CASE MESH.vtu [DRAWS]

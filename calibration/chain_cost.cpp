@@ -50,7 +50,8 @@ bool ChainCost::predict(const Eigen::VectorXd& u) const {
   try {
     const bool warm = accepted_.u.size() == u.size();
     simulation::ChainSolution near;
-    if (warm) near = extrapolated(accepted_.prediction.solution, accepted_.linearisation.by_coordinate, u - accepted_.u);
+    if (warm)
+      near = extrapolated(accepted_.prediction.solution, accepted_.linearisation.by_coordinate, u - accepted_.u);
     trial_.prediction = evaluator_.predict(parameters_.model(u), warm ? &near : nullptr);
   } catch (const NumericalFailure&) {
     ++log_.failed;
@@ -102,8 +103,8 @@ bool ChainCost::Evaluate(double const* const* parameters, double* residuals, dou
   jacobian.setZero();
   const Residuals& r = accepted_.residuals;
   for (Eigen::Index i = 0; i < r.size(); ++i)
-    jacobian.row(i) = accepted_.linearisation.slope.row(i) *
-                      (robust_slope(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i]);
+    jacobian.row(i) =
+        accepted_.linearisation.slope.row(i) * (robust_slope(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i]);
   Eigen::Index row = r.size();
   for (Eigen::Index j = 0; j < u.size() && row < num_residuals(); ++j)
     if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)]) jacobian(row++, j) = 1 / prior->sd;

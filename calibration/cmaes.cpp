@@ -16,9 +16,9 @@
 namespace supine::calibration {
 namespace {
 
-constexpr double half_box = 100;          // in σ; the ends of the parameters' ranges are kept by the penalty
-constexpr double failed_mm = 1e6;         // ranks behind everything
-constexpr double penalty_mm = 1;          // per σ²
+constexpr double half_box = 100;   // in σ; the ends of the parameters' ranges are kept by the penalty
+constexpr double failed_mm = 1e6;  // ranks behind everything
+constexpr double penalty_mm = 1;   // per σ²
 constexpr int flat_generations = 3;
 
 /// Either notes what is asked or answers from a table, in the order of the questions.
@@ -161,7 +161,8 @@ class Minimisation {
 }  // namespace
 
 void CmaesOptions::check() const {
-  if (population != 0 && population < 5) throw InputError(fmt::format("population = {}: must be 0 or >= 5", population));
+  if (population != 0 && population < 5)
+    throw InputError(fmt::format("population = {}: must be 0 or >= 5", population));
   if (max_evaluations < 1) throw InputError(fmt::format("max_evaluations = {}: must be > 0", max_evaluations));
   if (until_mae_mm && !(*until_mae_mm > 0)) throw InputError(fmt::format("until_mae = {}: must be > 0", *until_mae_mm));
 }

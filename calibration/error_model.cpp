@@ -73,8 +73,8 @@ Clusters clusters_of(const Residuals& residuals, const std::vector<int>& order, 
   std::vector<int> centres;
   for (const int row : order) {
     std::size_t c = 0;
-    while (c < centres.size() && (residuals.pose[centres[c]] != residuals.pose[row] ||
-                                  distance_mm(residuals, centres[c], row) > radius_mm))
+    while (c < centres.size() &&
+           (residuals.pose[centres[c]] != residuals.pose[row] || distance_mm(residuals, centres[c], row) > radius_mm))
       ++c;
     if (c == centres.size()) centres.push_back(row);
     clusters.of_point[row] = static_cast<int>(c);

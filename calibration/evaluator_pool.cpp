@@ -35,7 +35,7 @@ std::vector<RunResult> EvaluatorPool::run(const std::vector<Eigen::VectorXd>& va
                                           const std::function<void(const RunResult&)>& done) {
   std::vector<RunResult> results(values.size());
   std::exception_ptr failure;
-#pragma omp parallel for schedule(dynamic) num_threads(static_cast<int>(evaluators_.size()))
+#pragma omp parallel for schedule(dynamic) num_threads(static_cast <int>(evaluators_.size()))
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (const auto known = journal.find(values[i])) {
       results[i] = *known;

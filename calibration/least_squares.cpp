@@ -17,7 +17,7 @@ namespace supine::calibration {
 namespace {
 
 constexpr int most_mask_changes = 3;
-constexpr double mask_share = 0.01;  // of the points may change sides after a descent
+constexpr double mask_share = 0.01;           // of the points may change sides after a descent
 constexpr double spread_without_prior = 0.7;  // of further starts, in coordinates: a factor of two in a modulus
 
 ceres::Solver::Options solver_options(const FitOptions& options, bool rough) {
@@ -52,7 +52,8 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const FitOp
   std::vector<int> constant;
   for (int i = 0; i < u.size(); ++i)
     if (!held.empty() && held[static_cast<std::size_t>(i)]) constant.push_back(i);
-  if (constant.size() == static_cast<std::size_t>(u.size())) throw InputError("every parameter is held: nothing to fit");
+  if (constant.size() == static_cast<std::size_t>(u.size()))
+    throw InputError("every parameter is held: nothing to fit");
   if (!constant.empty()) problem.SetManifold(u.data(), new ceres::SubsetManifold(static_cast<int>(u.size()), constant));
   ceres::Solver::Summary summary;
   ceres::Solve(solver_options(options, !held.empty()), &problem, &summary);

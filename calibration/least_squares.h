@@ -17,13 +17,13 @@ struct FitProgress {
 };
 
 struct FitOptions {
-  double robust_mm = 5;       ///< beyond this a point counts linearly instead of quadratically, > 0
-  bool use_priors = true;     ///< where the model gives prior_sd
-  int max_iterations = 50;    ///< of one descent, > 0
-  int starts = 1;             ///< descents: from the model's values, then from seeded draws around them, > 0
-  unsigned seed = 1;          ///< of the draws
+  double robust_mm = 5;          ///< beyond this a point counts linearly instead of quadratically, > 0
+  bool use_priors = true;        ///< where the model gives prior_sd
+  int max_iterations = 50;       ///< of one descent, > 0
+  int starts = 1;                ///< descents: from the model's values, then from seeded draws around them, > 0
+  unsigned seed = 1;             ///< of the draws
   std::vector<double> noise_mm;  ///< per measurement, > 0
-  const simulation::ChainSolution* near = nullptr;  ///< solution of the model's values, where it is known
+  const simulation::ChainSolution* near = nullptr;   ///< solution of the model's values, where it is known
   std::function<void(const FitProgress&)> progress;  ///< may be empty
 
   void check(const Scene& scene) const;  ///< @throws InputError  naming the option, its value and the bound
@@ -31,7 +31,7 @@ struct FitOptions {
 
 /// One evaluation, for the history.
 struct FitEvaluation {
-  Eigen::VectorXd values;  ///< of the parameters
+  Eigen::VectorXd values;               ///< of the parameters
   double mae_study_mm, mae_mm, rms_mm;  ///< NaN when it failed
   bool failed, accepted;
   int start;  ///< which descent, from 0

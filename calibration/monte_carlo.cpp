@@ -55,9 +55,10 @@ Draws draw_parameters(const FreeParameters& parameters, DrawKind kind, int count
     int tries = 1;
     while (!draw(parameters, kind, generator, values)) {
       if (++tries > most_tries)
-        throw InputError(fmt::format("{} draws in a row lay outside the parameters' ranges; widen the ranges or make "
-                                     "prior_sd smaller",
-                                     most_tries));
+        throw InputError(
+            fmt::format("{} draws in a row lay outside the parameters' ranges; widen the ranges or make "
+                        "prior_sd smaller",
+                        most_tries));
       ++draws.refused;
     }
     draws.values.push_back(values);

@@ -57,8 +57,8 @@ double standardised_deviation(const Points& place, const Eigen::VectorXd& distan
 
 double estimate_noise_mm(const Points& place, const Eigen::VectorXd& distance_mm) {
   if (place.rows() < least_points)
-    throw InputError(fmt::format("the noise cannot be estimated from {} points (least {}); give noise_mm",
-                                 place.rows(), least_points));
+    throw InputError(fmt::format("the noise cannot be estimated from {} points (least {}); give noise_mm", place.rows(),
+                                 least_points));
   const Eigen::Index stride = (place.rows() + most_queries - 1) / most_queries;
   std::vector<double> deviation(static_cast<std::size_t>((place.rows() + stride - 1) / stride));
 #pragma omp parallel for schedule(static)

@@ -32,7 +32,7 @@ Residuals residuals_of(const Scene& scene, const Prediction& prediction, const P
 
 /// Columns ∂d/∂u of the residuals with respect to the coordinates of some parameters, and how the shapes move.
 struct Linearisation {
-  Eigen::MatrixXd slope;                               ///< #R by #parameters, mm per coordinate
+  Eigen::MatrixXd slope;                                   ///< #R by #parameters, mm per coordinate
   std::vector<simulation::ChainDerivative> by_coordinate;  ///< per coordinate
 };
 

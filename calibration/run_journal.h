@@ -14,7 +14,7 @@ namespace supine::calibration {
 
 /// What one chain run gave.
 struct RunResult {
-  bool failed = true;  ///< no equilibrium
+  bool failed = true;                               ///< no equilibrium
   double mae_study_mm = 0, mae_mm = 0, rms_mm = 0;  ///< meaningless when it failed
 };
 

@@ -35,11 +35,12 @@ std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const 
     Candidate candidate{effect->name(), {}, Eigen::MatrixXd(fit.residuals.size(), 0)};
     for (const Parameter& row : effect->parameters()) {
       const std::string name = simulation::parameter_name(*effect, row);
-      const Eigen::VectorXd slope = calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, name,
-                                                          sensitivities.of(name));
+      const Eigen::VectorXd slope =
+          calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, name, sensitivities.of(name));
       const double rms = slope.norm() / std::sqrt(static_cast<double>(slope.size()));
       if (!(rms * typical_size(row) > unfelt_mm)) continue;
-      candidate.parameters.push_back({name, row.unit, row.null, row.lower, row.upper, typical_size(row), row.one_sided});
+      candidate.parameters.push_back(
+          {name, row.unit, row.null, row.lower, row.upper, typical_size(row), row.one_sided});
       candidate.slope.conservativeResize(Eigen::NoChange, candidate.slope.cols() + 1);
       candidate.slope.col(candidate.slope.cols() - 1) = slope;
     }

@@ -43,10 +43,14 @@ void leave_open(FirstDiagnosis& result, double noise_mm, const VerdictRules& rul
 
 std::string verdict_name(Verdict verdict) {
   switch (verdict) {
-    case Verdict::nothing_missing: return "nothing_missing";
-    case Verdict::missing: return "missing";
-    case Verdict::ambiguous: return "ambiguous";
-    case Verdict::unexplained: return "unexplained";
+    case Verdict::nothing_missing:
+      return "nothing_missing";
+    case Verdict::missing:
+      return "missing";
+    case Verdict::ambiguous:
+      return "ambiguous";
+    case Verdict::unexplained:
+      return "unexplained";
   }
   return {};
 }

@@ -42,8 +42,8 @@ Refit refitted(calibration::Evaluator& evaluator, const simulation::Model& model
     result.parameters = parameters.names();
     result.values = parameters.values(fit.u);
     result.rms_mm = rms(fit.residuals.distance_mm);
-    result.held_out_rms_mm = rms(calibration::held_out_distances(
-        fit.residuals, fit.linearisation.slope, priors, calibration::spatial_blocks(fit.residuals)));
+    result.held_out_rms_mm = rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, priors,
+                                                                 calibration::spatial_blocks(fit.residuals)));
     result.evaluations = fit.evaluations;
   } catch (const NumericalFailure&) {
     // No equilibrium from the typical size: not a candidate that can be judged.
@@ -77,10 +77,10 @@ std::vector<Refit> refit_candidates(calibration::Evaluator& evaluator, const sim
   near_base.near = &base.prediction.solution;
   std::vector<Refit> refits;
   for (const std::string& effect : which) {
-    const auto score =
-        std::find_if(table.scores.begin(), table.scores.end(), [&effect](const Score& s) { return s.effect == effect; });
-    const auto candidate =
-        std::find_if(candidates.begin(), candidates.end(), [&effect](const Candidate& c) { return c.effect == effect; });
+    const auto score = std::find_if(table.scores.begin(), table.scores.end(),
+                                    [&effect](const Score& s) { return s.effect == effect; });
+    const auto candidate = std::find_if(candidates.begin(), candidates.end(),
+                                        [&effect](const Candidate& c) { return c.effect == effect; });
     if (score == table.scores.end() || candidate == candidates.end()) continue;
     simulation::Model with = model;
     with.effects.push_back(typical_setting(effect, *score, *candidate));

@@ -39,7 +39,10 @@ class Scorer {
  public:
   Scorer(const Residuals& residuals, const Eigen::MatrixXd& slope, const std::vector<Candidate>& candidates,
          const Whitening& whitening)
-      : residuals_(residuals), slope_(slope), candidates_(candidates), log_points_(std::log(whitening.effective_points())) {
+      : residuals_(residuals),
+        slope_(slope),
+        candidates_(candidates),
+        log_points_(std::log(whitening.effective_points())) {
     const Eigen::MatrixXd absorbed = basis(whitening.apply(slope));
     const auto freed = [&absorbed](const Eigen::MatrixXd& a) -> Eigen::MatrixXd {
       return a - absorbed * (absorbed.transpose() * a);

@@ -22,9 +22,9 @@ struct Score {
   bool wrong_sign;          ///< one-sided, and the step goes to the other side: T = 0
   bool beyond_range;        ///< a step leaves three times the range from null to bound: right shape, implausible amount
   double predicted_rms_mm;  ///< of all points after the joint linear step, steps cut at the bounds
-  double predicted_held_out_rms_mm;  ///< the same, every block of skin predicted without itself
-  double noncentrality;     ///< λ at the typical size: under 9 this scan cannot see the effect
-  double power;             ///< chance to find the effect at its typical size, alone and at 5 %
+  double predicted_held_out_rms_mm;              ///< the same, every block of skin predicted without itself
+  double noncentrality;                          ///< λ at the typical size: under 9 this scan cannot see the effect
+  double power;                                  ///< chance to find the effect at its typical size, alone and at 5 %
   std::vector<std::string> not_told_apart_from;  ///< candidates with a canonical correlation above 0.9
 };
 

@@ -55,8 +55,11 @@ Json worth_json(const FreeParameters& parameters, const CalibrationResult& resul
                            {"coordinate", parameters.is_log(i) ? "ln(value)" : "value, scaled"},
                            {"sd", sd[i]},
                            {"sd_if_points_erred_alone", std::sqrt(u.white(i, i))}});
-  return {{"rank", u.rank},          {"coordinates", coordinates}, {"correlation", correlation},
-          {"singular_values", singular}, {"not_told_apart", pairs}};
+  return {{"rank", u.rank},
+          {"coordinates", coordinates},
+          {"correlation", correlation},
+          {"singular_values", singular},
+          {"not_told_apart", pairs}};
 }
 
 }  // namespace
@@ -66,9 +69,9 @@ std::vector<std::string> calibration_remarks(const FreeParameters& parameters, c
   const auto& names = parameters.names();
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
     if (parameters.at_bound(result.fit.u, i))
-      remarks.push_back(fmt::format(
-          "{} ended at an end of its range ({:.4g} {}): the data pull it further, or say nothing about it",
-          names[static_cast<std::size_t>(i)], parameters.value(i, result.fit.u[i]), parameters.unit(i)));
+      remarks.push_back(
+          fmt::format("{} ended at an end of its range ({:.4g} {}): the data pull it further, or say nothing about it",
+                      names[static_cast<std::size_t>(i)], parameters.value(i, result.fit.u[i]), parameters.unit(i)));
   for (const auto& pair : result.uncertainty.not_told_apart)
     remarks.push_back(fmt::format("{} and {} cannot be told apart here (correlation {:.3f}): {}", pair.first,
                                   pair.second, pair.correlation,
@@ -77,14 +80,16 @@ std::vector<std::string> calibration_remarks(const FreeParameters& parameters, c
   if (result.uncertainty.rank < parameters.size())
     remarks.push_back(fmt::format("the measurement determines {} of {} directions of the parameters",
                                   result.uncertainty.rank, parameters.size()));
-  const auto is_free = [&names](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  const auto is_free = [&names](const char* name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
   const simulation::Model model = parameters.model(result.fit.u);
   const double modulus = model.skin.young_modulus_kpa.value, thickness = model.skin.thickness_mm.value;
-  remarks.push_back(fmt::format(
-      "the skin enters as modulus × thickness only: {:.4g} kPa × {:.4g} mm = {:.4g} kPa mm{}", modulus, thickness,
-      modulus * thickness,
-      is_free("skin.young_modulus_kpa") && is_free("skin.thickness_mm") ? "; both are free, which no data can settle"
-                                                                        : ""));
+  remarks.push_back(fmt::format("the skin enters as modulus × thickness only: {:.4g} kPa × {:.4g} mm = {:.4g} kPa mm{}",
+                                modulus, thickness, modulus * thickness,
+                                is_free("skin.young_modulus_kpa") && is_free("skin.thickness_mm")
+                                    ? "; both are free, which no data can settle"
+                                    : ""));
   remarks.push_back(fmt::format(
       "stiffness enters as stiffness / density only: with another density than {:.4g} kg/m3 every modulus and spring "
       "changes in proportion",

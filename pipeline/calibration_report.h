@@ -18,7 +18,7 @@ struct CalibrationResult {
   std::vector<calibration::Interval> intervals;
   std::string interval_kind;  ///< profile or linear
   std::vector<double> noise_mm;
-  calibration::DistanceFigures in_sample;       ///< points that were fitted
+  calibration::DistanceFigures in_sample;        ///< points that were fitted
   calibration::DistanceFigures held_out_blocks;  ///< the same points, each predicted from a fit without its block
   struct PoseError {
     std::string pose;
@@ -29,8 +29,7 @@ struct CalibrationResult {
 };
 
 /// Keys as in docs/calibration.md.
-nlohmann::ordered_json calibration_figures(const MeasuredCase& measured,
-                                           const calibration::FreeParameters& parameters,
+nlohmann::ordered_json calibration_figures(const MeasuredCase& measured, const calibration::FreeParameters& parameters,
                                            const CalibrationResult& result);
 
 /// What a person should know of parameters at their bounds, products and pairs, one sentence each.

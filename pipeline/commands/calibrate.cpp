@@ -39,7 +39,8 @@ class CalibrateTool : public Tool {
   std::string name() const override { return "supine-calibrate"; }
 
   std::string summary() const override {
-    return "Finds the free parameters of a model (those written as tables in model.toml) from the measured surface, and "
+    return "Finds the free parameters of a model (those written as tables in model.toml) from the measured surface, "
+           "and "
            "says what the answer is worth.\n"
            "Writes model.toml with the fitted values, history.csv (every chain run) and calibration.json. -o names "
            "their folder (default: that of the mesh).\n\n"
@@ -53,11 +54,14 @@ class CalibrateTool : public Tool {
     app.add_option("case", case_folder_, "case folder, holds case.toml")->required();
     app.add_option("mesh", mesh_file_, "imaged mesh, as supine-tetrahedralise writes it (.vtu)")->required();
     app.add_option("--model", model_file_, "the model to start from (default: CASE/model.toml)");
-    app.add_option("--method", method_, "least-squares (signed distances scan to model, exact sensitivities) or cmaes (the study's: MAE model to "
-                   "scan, without gradient; value and prior_sd are its start and sigma)")
+    app.add_option(
+           "--method", method_,
+           "least-squares (signed distances scan to model, exact sensitivities) or cmaes (the study's: MAE model to "
+           "scan, without gradient; value and prior_sd are its start and sigma)")
         ->check(CLI::IsMember({"least-squares", "cmaes"}))
         ->capture_default_str();
-    app.add_option("--until-mae", until_mae_, "MAE model to scan (study) to reach, mm: cmaes stops there; not reached: exit code 1");
+    app.add_option("--until-mae", until_mae_,
+                   "MAE model to scan (study) to reach, mm: cmaes stops there; not reached: exit code 1");
     app.add_option("--seed", seed_, "of everything that is drawn")->capture_default_str();
     app.add_option("--starts", starts_, "descents from drawn starts, the first from the model's values")
         ->check(CLI::Range(1, 1000))
@@ -65,7 +69,8 @@ class CalibrateTool : public Tool {
     app.add_option("--robust", robust_mm_, "a point further off than this many mm counts linearly")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
-    app.add_option("--intervals", intervals_, "linear (from the sensitivities, no further runs), or profile (a few refits per parameter and end)")
+    app.add_option("--intervals", intervals_,
+                   "linear (from the sensitivities, no further runs), or profile (a few refits per parameter and end)")
         ->check(CLI::IsMember({"profile", "linear"}))
         ->capture_default_str();
     app.add_option("--population", population_, "cmaes: runs per generation, 0 = 4 + 3 ln n, at least 6")
@@ -109,9 +114,10 @@ class CalibrateTool : public Tool {
   void check_targets() const {
     std::error_code none;
     if (fs::equivalent(folder() / "model.toml", measured_->model_file, none))
-      throw InputError(fmt::format("the fitted model would replace {}, which is the model to start from; name another "
-                                   "folder with -o",
-                                   measured_->model_file.string()));
+      throw InputError(
+          fmt::format("the fitted model would replace {}, which is the model to start from; name another "
+                      "folder with -o",
+                      measured_->model_file.string()));
   }
 
   calibration::FitOptions fit_options(Run& run, Evaluator& evaluator, LiveProgress& live) const {
@@ -191,9 +197,8 @@ class CalibrateTool : public Tool {
     LiveProgress live(run);
     std::size_t finished = journal.known();
     const auto map = calibration::map_error(
-        pool, parameters, result.fit.u, {0, 1}, map_, reach, journal, [&](const calibration::RunResult&) {
-          live.show(fmt::format("map: run {} of {}", ++finished, map_ * map_));
-        });
+        pool, parameters, result.fit.u, {0, 1}, map_, reach, journal,
+        [&](const calibration::RunResult&) { live.show(fmt::format("map: run {} of {}", ++finished, map_ * map_)); });
     const fs::path csv = folder() / "error_map.csv";
     calibration::write_map_csv(map, run.output(csv));
     calibration::write_map_vti(map, run.output(folder() / "error_map.vti"));
@@ -221,8 +226,8 @@ class CalibrateTool : public Tool {
     for (std::size_t m = 0; m < scene.measurements.size(); ++m) {
       calibration::Prediction one;
       one.poses.push_back(prediction.poses[m]);
-      result.held_out_poses.push_back({scene.measurements[m]->pose.name, one.mae_study_mm(),
-                                       calibration::figures_of(one.scan_distances())});
+      result.held_out_poses.push_back(
+          {scene.measurements[m]->pose.name, one.mae_study_mm(), calibration::figures_of(one.scan_distances())});
     }
   }
 

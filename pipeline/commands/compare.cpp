@@ -120,8 +120,8 @@ class CompareTool : public Tool {
     return calibration::anatomical_areas(inputs.predicted.mesh, anatomy);
   }
 
-  std::vector<calibration::LandmarkError> compare_landmarks(const Inputs& inputs,
-                                                            const calibration::ScanMotion& motion, Run& run) const {
+  std::vector<calibration::LandmarkError> compare_landmarks(const Inputs& inputs, const calibration::ScanMotion& motion,
+                                                            Run& run) const {
     if (!inputs.pose.landmarks) return {};
     const fs::path predicted = pose_file_.parent_path() / (pose_file_.stem().string() + "_landmarks.csv");
     if (!fs::exists(predicted)) {

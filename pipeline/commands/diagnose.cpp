@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/diagnose.h"
+
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
@@ -7,7 +9,6 @@
 #include "calibration/compare.h"
 #include "calibration/uncertainty.h"
 #include "common/error.h"
-#include "diagnosis/diagnose.h"
 #include "diagnosis/diagnosis_file.h"
 #include "pipeline/measured_case.h"
 
@@ -23,7 +24,8 @@ using Json = nlohmann::ordered_json;
 
 const std::string caveat =
     "scores are linear, from the fitted model alone; p values take the errors of model and mesh to be "
-    "like those that neighbouring points share here. With white noise (bic_white) every error of the mesh looks like an "
+    "like those that neighbouring points share here. With white noise (bic_white) every error of the mesh looks like "
+    "an "
     "effect";
 
 class DiagnoseTool : public Tool {
@@ -31,7 +33,8 @@ class DiagnoseTool : public Tool {
   std::string name() const override { return "supine-diagnose"; }
 
   std::string summary() const override {
-    return "Asks of every effect of the catalogue that a calibrated model lacks: would the error fall if it were there? "
+    return "Asks of every effect of the catalogue that a calibrated model lacks: would the error fall if it were "
+           "there? "
            "No equilibrium is solved for that, so the whole catalogue takes seconds.\n"
            "Writes diagnosis.json and diagnosis.vtp (scan points with the shape of each effect). -o names their folder "
            "(default: that of the mesh).\n\n"
@@ -111,10 +114,11 @@ class DiagnoseTool : public Tool {
     for (Eigen::Index i = 0; i < step.size(); ++i) {
       if (parameters.at_bound(fit.u, i)) continue;
       if (std::abs(step[i]) < far * std::sqrt(worth.covariance(i, i))) continue;
-      run.warn(fmt::format("{} = {:.4g} is not at its optimum (a linear step leads to {:.4g}): run supine-calibrate and "
-                           "diagnose the model it writes",
-                           parameters.names()[static_cast<std::size_t>(i)], parameters.value(i, fit.u[i]),
-                           parameters.value(i, fit.u[i] + step[i])));
+      run.warn(
+          fmt::format("{} = {:.4g} is not at its optimum (a linear step leads to {:.4g}): run supine-calibrate and "
+                      "diagnose the model it writes",
+                      parameters.names()[static_cast<std::size_t>(i)], parameters.value(i, fit.u[i]),
+                      parameters.value(i, fit.u[i] + step[i])));
     }
   }
 
@@ -207,8 +211,8 @@ class DiagnoseTool : public Tool {
     for (const Score& score : result.table.scores)
       for (const Score& white : result.white.scores)
         if (white.effect == score.effect)
-          f["candidates"].push_back(candidate_json(candidate_of(candidates, score), score, white,
-                                                   refit_of(result, score.effect)));
+          f["candidates"].push_back(
+              candidate_json(candidate_of(candidates, score), score, white, refit_of(result, score.effect)));
     f["base_rms_mm"] = result.table.base_rms_mm;
     f["base_held_out_rms_mm"] = result.table.base_held_out_rms_mm;
     f["budget_mm"] = budget(fit, worth);
@@ -255,8 +259,8 @@ class DiagnoseTool : public Tool {
   static void say(const Run& run, const std::vector<diagnosis::Candidate>& candidates,
                   const diagnosis::FirstDiagnosis& result) {
     const ScoreTable& t = result.table;
-    run.say(fmt::format("  RMS {:.3f} mm, held out {:.3f} mm; the scan is worth {:.0f} independent points", t.base_rms_mm,
-                        t.base_held_out_rms_mm, t.effective_points));
+    run.say(fmt::format("  RMS {:.3f} mm, held out {:.3f} mm; the scan is worth {:.0f} independent points",
+                        t.base_rms_mm, t.base_held_out_rms_mm, t.effective_points));
     run.say(fmt::format("  {:<20}{:>9}{:>4}{:>9}{:>9}{:>8}{:>10}{:>10}   {}", "if it had", "T", "q", "BIC", "white",
                         "p", "RMS, mm", "held out", "one-step size"));
     run.say(fmt::format("  {:>59}{:>10}{:>10}", "", "predicted", "predicted"));
@@ -287,7 +291,8 @@ class DiagnoseTool : public Tool {
       for (std::size_t i = 0; i < refit.parameters.size(); ++i)
         values += fmt::format("{}{} {:.3g}", i > 0 ? ", " : "", refit.parameters[i],
                               refit.values[static_cast<Eigen::Index>(i)]);
-      run.say(fmt::format("  {:<20}{:>10.3f}{:>10.3f}   {}", refit.effect, refit.rms_mm, refit.held_out_rms_mm, values));
+      run.say(
+          fmt::format("  {:<20}{:>10.3f}{:>10.3f}   {}", refit.effect, refit.rms_mm, refit.held_out_rms_mm, values));
     }
     if (!result.unseen.empty())
       run.say(fmt::format("  cannot be felt by these points: {}", fmt::join(result.unseen, ", ")));
@@ -298,11 +303,13 @@ class DiagnoseTool : public Tool {
   static void say_verdict(const Run& run, const diagnosis::FirstDiagnosis& result) {
     const std::string names = fmt::format("{}", fmt::join(result.missing, ", "));
     switch (result.verdict) {
-      case Verdict::nothing_missing: return run.say("Nothing in the catalogue is seen to be missing.");
+      case Verdict::nothing_missing:
+        return run.say("Nothing in the catalogue is seen to be missing.");
       case Verdict::missing:
         return run.say(fmt::format("Missing: {}. Add it and calibrate again: supine-model add {} model.toml", names,
                                    result.missing[0]));
-      case Verdict::ambiguous: return run.say(fmt::format("Missing, one of (not told apart): {}", names));
+      case Verdict::ambiguous:
+        return run.say(fmt::format("Missing, one of (not told apart): {}", names));
       case Verdict::unexplained:
         return run.say(fmt::format("Something is missing that the catalogue does not explain (best: {})", names));
     }

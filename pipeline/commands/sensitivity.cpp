@@ -56,9 +56,10 @@ class SensitivityTool : public Tool {
     const DrawKind kind = law_ == "normal" ? DrawKind::normal : DrawKind::prior;
     const calibration::Draws draws = calibration::draw_parameters(parameters, kind, samples_, seed_);
     if (draws.refused > 0)
-      run.warn(fmt::format("{} of {} draws lay outside the range of a parameter (with the normal law mostly negative "
-                           "moduli) and were refused; the sample is that of the law cut at the ranges",
-                           draws.refused, samples_ + draws.refused));
+      run.warn(
+          fmt::format("{} of {} draws lay outside the range of a parameter (with the normal law mostly negative "
+                      "moduli) and were refused; the sample is that of the law cut at the ranges",
+                      draws.refused, samples_ + draws.refused));
     run.stage("runs");
     const std::vector<RunResult> results = simulate(run, parameters, draws, target);
     run.stage("write");
@@ -120,8 +121,8 @@ class SensitivityTool : public Tool {
               const Eigen::MatrixXd& values, const std::vector<double>& mae) const {
     const int failed = samples_ - static_cast<int>(mae.size());
     if (mae.size() < 2)
-      throw NumericalFailure(fmt::format("{} of {} draws had an equilibrium; narrow prior_sd or raise the moduli",
-                                         mae.size(), samples_));
+      throw NumericalFailure(
+          fmt::format("{} of {} draws had an equilibrium; narrow prior_sd or raise the moduli", mae.size(), samples_));
     const Eigen::Map<const Eigen::VectorXd> m(mae.data(), static_cast<Eigen::Index>(mae.size()));
     const double sd = std::sqrt((m.array() - m.mean()).square().sum() / static_cast<double>(m.size() - 1));
     const Eigen::VectorXd shares = calibration::first_order_shares(values, m);
@@ -147,9 +148,10 @@ class SensitivityTool : public Tool {
   void say(const Run& run, const FreeParameters& parameters, const std::vector<double>& mae,
            const std::pair<double, double>& mean_and_sd, const Eigen::VectorXd& shares, int failed) const {
     run.say(fmt::format("  {} chain runs, {} without equilibrium", samples_, failed));
-    run.say(fmt::format("  MAE model to scan (study): {:.2f} ± {:.2f} mm (mean, sd); 5 % {:.2f}, median {:.2f}, 95 % {:.2f}",
-                        mean_and_sd.first, mean_and_sd.second, calibration::percentile(mae, 0.05),
-                        calibration::percentile(mae, 0.5), calibration::percentile(mae, 0.95)));
+    run.say(fmt::format(
+        "  MAE model to scan (study): {:.2f} ± {:.2f} mm (mean, sd); 5 % {:.2f}, median {:.2f}, 95 % {:.2f}",
+        mean_and_sd.first, mean_and_sd.second, calibration::percentile(mae, 0.05), calibration::percentile(mae, 0.5),
+        calibration::percentile(mae, 0.95)));
     for (Eigen::Index p = 0; p < shares.size(); ++p)
       run.say(fmt::format("  {:>5.1f} % of the variance from {}", 100 * shares[p],
                           parameters.names()[static_cast<std::size_t>(p)]));

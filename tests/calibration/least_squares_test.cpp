@@ -35,7 +35,7 @@ TEST(LeastSquares, RobustResidualIsSmoothAndItsSlopeIsItsDerivative) {
     const auto along = [d](double h) { return robust_residual(d + h, 5); };
     EXPECT_GT(taylor_order(along, robust_slope(d, 5), 0.02), d == 0.0 ? 2.5 : 1.85) << d;
   }
-  EXPECT_NEAR(robust_residual(1e-3, 5), 1e-3, 1e-9);                    // small ones count fully,
+  EXPECT_NEAR(robust_residual(1e-3, 5), 1e-3, 1e-9);                   // small ones count fully,
   EXPECT_NEAR(std::pow(robust_residual(1e4, 5), 2) / 2, 5 * 1e4, 30);  // large ones linearly: ½g² → δ|d| − δ²
 }
 

@@ -150,7 +150,8 @@ TEST(HeldOut, IsLargerThanTheErrorOfTheFitForManyParametersOnNoise) {
   Residuals r = patch(400, 0.7, 0, 15, 10);
   Eigen::MatrixXd slope(400, 12);
   for (int k = 0; k < 12; ++k)
-    slope.col(k) = (r.place.col(k % 2).array() * (k + 1) / 80).sin() * (r.place.col((k + 1) % 2).array() / 50 + k).cos();
+    slope.col(k) =
+        (r.place.col(k % 2).array() * (k + 1) / 80).sin() * (r.place.col((k + 1) % 2).array() / 50 + k).cos();
   r.distance_mm -= slope * slope.colPivHouseholderQr().solve(r.distance_mm).eval();
   const Eigen::VectorXd out = held_out_distances(r, slope, Eigen::VectorXd::Zero(12), spatial_blocks(r));
   EXPECT_GT(out.norm(), 1.02 * r.distance_mm.norm());

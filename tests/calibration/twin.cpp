@@ -48,8 +48,8 @@ Twin::Twin(const Options& options) {
   simulation::Chain chain(mesh, anatomy, options.truth, {prone, supine});
   solution = chain.solve(options.truth);
   const calibration::ModelSkin skin(mesh, solution.poses[0].x);
-  measurement.reset(new calibration::Measurement{
-      supine, calibration::Scan(scan_of(skin, options), skin), options.noise_mm > 0 ? options.noise_mm : 0.7});
+  measurement.reset(new calibration::Measurement{supine, calibration::Scan(scan_of(skin, options), skin),
+                                                 options.noise_mm > 0 ? options.noise_mm : 0.7});
 }
 
 simulation::Model twin_truth() {

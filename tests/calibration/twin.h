@@ -12,12 +12,12 @@ namespace supine::testing {
 /// A small breast whose supine scan is the engine's own prediction for known numbers, so that every answer is known.
 struct Twin {
   struct Options {
-    simulation::Model truth;      ///< the scan is its prediction
-    double noise_mm = 0;          ///< added along the skin's normal, seeded
+    simulation::Model truth;  ///< the scan is its prediction
+    double noise_mm = 0;      ///< added along the skin's normal, seeded
     unsigned seed = 1;
-    double shrink = 0.7;          ///< scan triangles about their centres: closest points lie inside the skin's triangles
-    double left_out_from_x = 1e9;  ///< a hole: no scan where x is beyond this
-    bool reversed = false;        ///< points and triangles in the opposite order
+    double shrink = 0.7;  ///< scan triangles about their centres: closest points lie inside the skin's triangles
+    double left_out_from_x = 1e9;                             ///< a hole: no scan where x is beyond this
+    bool reversed = false;                                    ///< points and triangles in the opposite order
     Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();  ///< everything seen from elsewhere
   };
 

@@ -57,8 +57,8 @@ TEST(Uncertainty, SharedErrorsWidenTheIntervals) {
   Fit shared = f.fit;
   // A wave of 0.7 mm over the skin that the parameters do not make.
   for (Eigen::Index i = 0; i < shared.residuals.size(); ++i)
-    shared.residuals.distance_mm[i] += 0.7 * std::sin(shared.residuals.place(i, 0) / 8) *
-                                       std::cos(shared.residuals.place(i, 2) / 8);
+    shared.residuals.distance_mm[i] +=
+        0.7 * std::sin(shared.residuals.place(i, 0) / 8) * std::cos(shared.residuals.place(i, 2) / 8);
   const Uncertainty alone = judge(f.fit, f.parameters, false), together = judge(shared, f.parameters, false);
   EXPECT_GT(together.errors.spread_mm, alone.errors.spread_mm + 0.2);
   EXPECT_GT(together.covariance(0, 0), 2 * together.white(0, 0));

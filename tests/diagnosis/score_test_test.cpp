@@ -72,8 +72,7 @@ double left_over(const Residuals& r, const Eigen::MatrixXd& columns) {
 TEST(ScoreTest, StatisticIsTheFallOfTheSumOfSquares) {
   const Residuals r = sheet(1);
   const auto candidates = catalogue_of(r);
-  const ScoreTable table =
-      score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
   for (const Candidate& c : candidates) {
     if (score_of(table, c.effect).wrong_sign) continue;
     Eigen::MatrixXd both(r.size(), 2 + c.slope.cols());
@@ -116,8 +115,7 @@ TEST(ScoreTest, WhatRecalibrationAbsorbsScoresNothing) {
   r.distance_mm += 3 * fitted_slopes(r).col(1);
   const ScoreTable before = score_candidates(sheet(4), fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
   const ScoreTable after = score_candidates(r, fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
-  for (const Score& score : before.scores)
-    EXPECT_NEAR(score.statistic, score_of(after, score.effect).statistic, 1e-7);
+  for (const Score& score : before.scores) EXPECT_NEAR(score.statistic, score_of(after, score.effect).statistic, 1e-7);
 }
 
 TEST(ScoreTest, FalseAlarmsComeAtTheirRate) {
@@ -142,7 +140,8 @@ TEST(ScoreTest, SameDirectionIsNotToldApart) {
 }
 
 TEST(ScoreTest, PowerIsThatOfTheNoncentralChiSquared) {
-  // Central: 5 %. λ with a power of 80 % (tables of the noncentral χ²): 7.849 (q = 1), 9.635 (2), 10.903 (3), 13.624 (6).
+  // Central: 5 %. λ with a power of 80 % (tables of the noncentral χ²): 7.849 (q = 1), 9.635 (2), 10.903 (3), 13.624
+  // (6).
   for (const int q : {1, 2, 3, 6}) EXPECT_NEAR(chi_squared_power(q, 0), 0.05, 0.01) << q;
   EXPECT_NEAR(chi_squared_power(1, 7.849), 0.8, 0.01);
   EXPECT_NEAR(chi_squared_power(2, 9.635), 0.8, 0.01);

@@ -54,5 +54,29 @@ TEST_F(ModelEdit, RemovingWhatIsNotThereIsRefused) {
   expect_words(input_error([&] { without_effect(file(base), "ligament"); }), {"model.toml", "ligament"});
 }
 
+TEST_F(ModelEdit, NewValuesKeepEverythingElse) {
+  const std::string text =
+      "# größer\n[breast]\nyoung_modulus_kpa = { value = 0.5, prior_sd = 0.4 }  # µ\n[skin]\nthickness_mm = 2\n"
+      "[skin.young_modulus_kpa]\nvalue = 20  # soft\n[[effect]]\nname = \"ligament\"\n"
+      "stiffness_kpa_per_mm = { lower = 0, value = 0.4 }\n";
+  const auto path = file(text);
+  const std::string edited = with_values(path, {{"breast.young_modulus_kpa", 1.0 / 3},
+                                                {"skin.young_modulus_kpa", 33.25},
+                                                {"ligament.stiffness_kpa_per_mm", 0.125}});
+  std::string expected = text;
+  expected.replace(expected.find("value = 0.5"), 11, "value = 0.3333333333333333");
+  expected.replace(expected.find("value = 20"), 10, "value = 33.25");
+  expected.replace(expected.find("value = 0.4"), 11, "value = 0.125");
+  EXPECT_EQ(edited, expected);
+  const simulation::Model model = read_model(file(edited));
+  EXPECT_EQ(model.breast.young_modulus_kpa.value, 1.0 / 3);
+  EXPECT_EQ(model.skin.young_modulus_kpa.value, 33.25);
+}
+
+TEST_F(ModelEdit, NewValuesAreForFreeParametersOnly) {
+  EXPECT_THROW(with_values(file(base), {{"breast.young_modulus_kpa", 1}}), InputError);
+  EXPECT_THROW(with_values(file(base), {{"ligament.stiffness_kpa_per_mm", 1}}), InputError);
+}
+
 }  // namespace
 }  // namespace supine::pipeline

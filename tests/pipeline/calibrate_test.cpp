@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+// The built calibration, sensitivity and diagnosis tools on a small case.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/model_file.h"
+#include "tests/pipeline/process.h"
+#include "tests/pipeline/small_case.h"
+#include "tests/pipeline/small_run.h"
+#include "tests/pipeline/temporary_folder.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+const std::string model_text = R"([breast]
+law = "neo_hookean"
+young_modulus_kpa = { value = 1.5, prior_sd = 0.5, lower = 0.3, upper = 20 }  # from the clinic
+[skin]
+young_modulus_kpa = { value = 30, prior_sd = 20, lower = 1, upper = 300 }
+)";
+
+class Calibrate : public testing::Test {
+ protected:
+  Calibrate() {
+    run_process({"cp", "-a", small_run().string(), folder().string()});
+    write_text(folder() / "model.toml", model_text);
+  }
+  Finished run(const std::string& name, const std::string& to, std::vector<std::string> more = {}) {
+    std::vector<std::string> command = {tool(name), folder().string(), (folder() / "out/mesh.vtu").string(), "-o",
+                                        (folder() / to).string()};
+    command.insert(command.end(), more.begin(), more.end());
+    return run_process(command);
+  }
+  Json json(const fs::path& file) const { return Json::parse(std::ifstream(folder() / file)); }
+  std::string bytes(const fs::path& file) const { return read_text(folder() / file); }
+  /// Everything but what is outside the promise of identical bytes.
+  std::string without_timing(const fs::path& file) const {
+    Json all = json(file);
+    all.erase("timing");
+    return all.dump();
+  }
+  fs::path folder() const { return folder_ / "case"; }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Calibrate, LowersTheErrorAndSaysWhatTheAnswerIsWorth) {
+  const Finished finished = run("calibrate", "fit");
+  ASSERT_LE(finished.code, 1) << finished.err;
+  const Json result = json("fit/calibration.json");
+  for (const char* key : {"method", "mae_study_mm", "mae_mm", "rms_mm", "held_out_rms_mm", "parameters", "evaluations",
+                          "iterations", "failed_solves", "worth", "error_model", "remarks"})
+    EXPECT_TRUE(result.contains(key)) << key;
+  std::istringstream history(bytes("fit/history.csv"));
+  std::string header, first;
+  std::getline(history, header);
+  std::getline(history, first);
+  EXPECT_EQ(
+      header,
+      "evaluation,start,breast.young_modulus_kpa,skin.young_modulus_kpa,mae_study_mm,mae_mm,rms_mm,failed,accepted");
+  std::vector<std::string> fields(1);
+  for (const char c : first) c == ',' ? fields.emplace_back() : (void)(fields.back() += c);
+  EXPECT_LT(result["rms_mm"].get<double>(), std::stod(fields.at(fields.size() - 3)));
+  for (const Json& parameter : result["parameters"]) {
+    EXPECT_LE(parameter["interval95"][0], parameter["value"]);
+    EXPECT_GE(parameter["interval95"][1], parameter["value"]);
+  }
+}
+
+TEST_F(Calibrate, WritesTheModelWithCommentsAndFittedNumbers) {
+  ASSERT_LE(run("calibrate", "fit").code, 1);
+  const std::string text = bytes("fit/model.toml");
+  EXPECT_NE(text.find("# from the clinic"), std::string::npos);
+  EXPECT_EQ(bytes("model.toml"), model_text);  // the user's own stays
+  const simulation::Model model = read_model(folder() / "fit/model.toml");
+  EXPECT_EQ(model.breast.young_modulus_kpa.value, json("fit/calibration.json")["parameters"][0]["value"].get<double>());
+  EXPECT_EQ(model.breast.young_modulus_kpa.prior_sd, 0.5);
+}
+
+TEST_F(Calibrate, GivesTheSameBytesForAnyNumberOfThreads) {
+  ASSERT_LE(run("calibrate", "one", {"--threads", "1", "--map", "2"}).code, 1);
+  ASSERT_LE(run("calibrate", "two", {"--threads", "2", "--map", "2"}).code, 1);
+  for (const char* name : {"model.toml", "history.csv", "error_map.csv", "error_map.vti"})
+    EXPECT_EQ(bytes(fs::path("one") / name), bytes(fs::path("two") / name)) << name;
+  EXPECT_EQ(without_timing("one/calibration.json"), without_timing("two/calibration.json"));
+}
+
+TEST_F(Calibrate, CmaesMissesAnImpossibleTargetAndSaysSo) {
+  const Finished finished =
+      run("calibrate", "cma", {"--method", "cmaes", "--max-evaluations", "6", "--until-mae", "0.001"});
+  EXPECT_EQ(finished.code, 1) << finished.err;
+  EXPECT_NE(finished.err.find("--until-mae"), std::string::npos) << finished.err;
+  EXPECT_EQ(json("cma/calibration.json")["method"], "cmaes");
+  EXPECT_EQ(json("cma/calibration.json")["evaluations"], 6);
+  EXPECT_FALSE(fs::exists(folder() / "cma/calibration.runs"));
+}
+
+TEST_F(Calibrate, RefusesWhatItCannotDo) {
+  const std::string fixed = "[breast]\nyoung_modulus_kpa = 1.5\n";
+  write_text(folder() / "fixed.toml", fixed);
+  Finished finished = run("calibrate", "fit", {"--model", (folder() / "fixed.toml").string()});
+  EXPECT_EQ(finished.code, 2);
+  EXPECT_NE(finished.err.find("no free parameter"), std::string::npos) << finished.err;
+  finished = run("calibrate", ".");  // would replace the user's model
+  EXPECT_EQ(finished.code, 2);
+  EXPECT_NE(finished.err.find("name another folder"), std::string::npos) << finished.err;
+  EXPECT_EQ(bytes("model.toml"), model_text);
+  EXPECT_FALSE(fs::exists(folder() / "fit"));
+}
+
+TEST_F(Calibrate, SensitivityGoesThroughItsDraws) {
+  const Finished finished = run("sensitivity", "s", {"--samples", "5", "--law", "normal", "--seed", "3"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const Json result = json("s/sensitivity.json");
+  EXPECT_EQ(result["samples"], 5);
+  EXPECT_EQ(result["parameters"].size(), 2u);
+  EXPECT_GT(result["mae_study_mm"]["sd"].get<double>(), 0);
+  EXPECT_FALSE(fs::exists(folder() / "s/sensitivity.runs"));
+  const std::string text = bytes("s/sensitivity.csv");
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 6);
+}
+
+TEST_F(Calibrate, DiagnosisAsksTheWholeCatalogue) {
+  ASSERT_LE(run("calibrate", "out", {"--force"}).code, 1);
+  const Finished finished = run("diagnose", "out", {"--force", "--refit", "1"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const Json result = json("out/diagnosis.json");
+  for (const char* key : {"verdict", "missing", "candidates", "base_held_out_rms_mm", "budget_mm", "hot_spots",
+                          "cannot_see", "next_measurement"})
+    EXPECT_TRUE(result.contains(key)) << key;
+  EXPECT_GT(result["candidates"].size(), 8u);
+  int refitted = 0;
+  for (const Json& candidate : result["candidates"]) refitted += !candidate["refit_rms_mm"].is_null();
+  EXPECT_GE(refitted, 1);
+  EXPECT_LE(refitted, 2);
+}
+
+TEST_F(Calibrate, MakeGoesFromTheMeshToTheDiagnosisAndRunsNothingTwice) {
+  std::vector<std::string> command = make_command(folder());
+  command.insert(command.end(), {"calibrate", "diagnose"});
+  const Finished first = run_process(command);
+  ASSERT_EQ(first.code, 0) << first.err;
+  for (const char* name :
+       {"model.toml", "history.csv", "calibration.json", "diagnosis.json", "calibrated/comparison.vtp"})
+    EXPECT_TRUE(fs::exists(folder() / "out" / name)) << name;
+  const Finished second = run_process(command);
+  EXPECT_EQ(second.code, 0) << second.err;
+  EXPECT_EQ(second.out.find("== "), std::string::npos) << second.out;
+}
+
+}  // namespace
+}  // namespace supine::pipeline
