@@ -8,8 +8,8 @@
 #include <new>
 
 #include "common/error.h"
-#include "pipeline/blas_kernels.h"
 #include "pipeline/provenance.h"
+#include "pipeline/runtime_settings.h"
 
 extern "C" void openblas_set_num_threads(int threads);
 
@@ -71,7 +71,7 @@ int complain(const Tool& tool, std::string_view message, int code) {
 }  // namespace
 
 int tool_main(Tool& tool, int argc, char** argv) {
-  use_fitting_blas_kernels(argv);
+  use_fitting_settings(argv);
   install_interrupt_handler();
   CLI::App app(tool.summary(), tool.name());
   CommonOptions common;

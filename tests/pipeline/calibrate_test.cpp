@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "pipeline/model_file.h"
 #include "tests/pipeline/process.h"
@@ -62,8 +63,9 @@ TEST_F(Calibrate, LowersTheErrorAndSaysWhatTheAnswerIsWorth) {
   EXPECT_EQ(
       header,
       "evaluation,start,breast.young_modulus_kpa,skin.young_modulus_kpa,mae_study_mm,mae_mm,rms_mm,failed,accepted");
-  std::vector<std::string> fields(1);
-  for (const char c : first) c == ',' ? fields.emplace_back() : (void)(fields.back() += c);
+  std::vector<std::string> fields;
+  std::istringstream row(first);
+  for (std::string field; std::getline(row, field, ',');) fields.push_back(field);
   EXPECT_LT(result["rms_mm"].get<double>(), std::stod(fields.at(fields.size() - 3)));
   for (const Json& parameter : result["parameters"]) {
     EXPECT_LE(parameter["interval95"][0], parameter["value"]);

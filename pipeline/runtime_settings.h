@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+namespace supine::pipeline {
+
+/// Starts the program again with two settings that its libraries read from the environment when they are loaded, and
+/// never afterwards. A variable the user has set is left alone; returns when nothing is to be done.
+///
+/// OPENBLAS_CORETYPE, when OpenBLAS did not recognise the processor: on processors newer than itself, and on many
+/// virtual machines, it falls back to the kernels of 2004, which makes factorisations about twice as slow.
+///
+/// GOMP_SPINCOUNT: a thread that waits for others burns its core for milliseconds by default. Two programs on one
+/// machine then hold each other up, measured: more than ten times. A thousand turns (microseconds) cost nothing alone.
+void use_fitting_settings(char** argv);
+
+}  // namespace supine::pipeline
