@@ -27,11 +27,29 @@ int area_at(const ClosestPoints& closest, Eigen::Index i, const SkinAreas& areas
   return areas.of_point[closest.node(i, corner)];
 }
 
-Eigen::VectorXd area_sizes_mm2(const ModelSkin& model, const SkinAreas& areas) {
-  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(areas.names.size());
+// A third of each triangle to each corner, by mesh point.
+Eigen::VectorXd point_areas_mm2(const ModelSkin& model) {
+  Eigen::VectorXd areas = Eigen::VectorXd::Zero(model.nodes().back() + 1);
   for (Eigen::Index t = 0; t < model.triangles().rows(); ++t) {
-    for (const int node : model.triangles().row(t)) sizes[areas.of_point[node]] += model.distance().areas_mm2()[t] / 3;
+    for (const int node : model.triangles().row(t)) areas[node] += model.distance().areas_mm2()[t] / 3;
   }
+  return areas;
+}
+
+// By area, not by points: meshes may be finer at the skin's end, which no scan covers.
+double covered_share(const ModelSkin& model, const ModelToScan& to_scan) {
+  const Eigen::VectorXd areas = point_areas_mm2(model);
+  double covered = 0;
+  for (Eigen::Index i = 0; i < to_scan.covered.size(); ++i) {
+    if (to_scan.covered[i]) covered += areas[model.nodes()[i]];
+  }
+  return covered / areas.sum();
+}
+
+Eigen::VectorXd area_sizes_mm2(const ModelSkin& model, const SkinAreas& areas) {
+  const Eigen::VectorXd points = point_areas_mm2(model);
+  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(areas.names.size());
+  for (const int node : model.nodes()) sizes[areas.of_point[node]] += points[node];
   return sizes;
 }
 
@@ -67,7 +85,7 @@ Comparison compare(const ModelSkin& model, const Scan& scan, const SkinAreas& ar
   Comparison result;
   model_to_scan(scan, model.node_points(), model.node_normals(), bounds, result.model_to_scan);
   result.mae_study_mm = mae_of_covered(result.model_to_scan);
-  result.covered_fraction = static_cast<double>(result.model_to_scan.covered.count()) / model.nodes().size();
+  result.covered_fraction = covered_share(model, result.model_to_scan);
 
   scan_to_model(model, scan.points(), result.scan_to_model);
   result.used = !result.scan_to_model.closest.on_border;
