@@ -2,11 +2,14 @@
 #include "segmentation/fast_marching.h"
 
 #include <fmt/format.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
+#include <new>
 #include <vector>
 
 #include "common/error.h"
@@ -15,9 +18,35 @@ namespace supine::segmentation {
 namespace {
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
-constexpr std::uint8_t open = 0, known = 1, given = 2;  // given: its time is exact, but it has not been passed yet
 constexpr std::size_t bucket_count = 4096;
 constexpr int rim = 2;  // voxels around the volume that no front enters, so that stencils need no bounds
+
+/// Time and state of a voxel side by side: the front comes back to its voxels in an order that no cache foresees.
+struct Voxel {
+  float time = infinite;
+  float slowness = infinite;  ///< negative once the front has passed; infinite where it may not go or the time is given
+  bool passed() const { return std::signbit(slowness); }
+  void pass() { slowness = -slowness; }
+};
+
+/// Memory in large pages where the system has them: half of the time went into finding small ones.
+template <class T>
+struct LargePages {
+  using value_type = T;
+  LargePages() = default;
+  template <class U>
+  LargePages(const LargePages<U>&) {}
+  T* allocate(std::size_t count) {
+    constexpr std::size_t page = std::size_t{1} << 21;
+    const std::size_t bytes = (count * sizeof(T) + page - 1) / page * page;
+    void* memory = std::aligned_alloc(page, bytes);
+    if (memory == nullptr) throw std::bad_alloc();
+    madvise(memory, bytes, MADV_HUGEPAGE);
+    return static_cast<T*>(memory);
+  }
+  void deallocate(T* memory, std::size_t) { std::free(memory); }
+  bool operator==(const LargePages&) const { return true; }
+};
 
 /// Voxels in the order of their times: buckets of equal width, of which the earliest is a heap. Times beyond the last
 /// bucket wait aside until the others are used up.
@@ -82,24 +111,22 @@ class BucketQueue {
 class March {
  public:
   March(const Image<float>& speed, const FastMarchingOptions& options)
-      : grid_(speed.grid), options_(options), queue_(bucket_width(speed)) {
+      : speed_(speed), grid_(speed.grid), options_(options), queue_(bucket_width(speed)) {
     const Eigen::Vector3i padded = grid_.size.array() + 2 * rim;
     strides_ = {1, padded.x(), static_cast<std::ptrdiff_t>(padded.x()) * padded.y()};
     const std::size_t count = static_cast<std::size_t>(strides_[2]) * padded.z();
-    time_.assign(count, infinite);
-    slowness_.assign(count, infinite);
-    state_.assign(count, open);
+    voxels_.resize(count);
 #pragma omp parallel for schedule(static)
     for (int k = 0; k < grid_.size.z(); ++k)
       for (int j = 0; j < grid_.size.y(); ++j)
-        for (int i = 0; i < grid_.size.x(); ++i) slowness_[padded_index(i, j, k)] = 1 / speed.at(i, j, k);
+        for (int i = 0; i < grid_.size.x(); ++i) voxels_[padded_index(i, j, k)].slowness = 1 / speed.at(i, j, k);
     for (int a = 0; a < 3; ++a) inverse_[a] = static_cast<float>(1 / grid_.spacing_mm[a]);
   }
 
   void start(const FrontSource& source) {
     const Eigen::Vector3d at = grid_.continuous_index(source.point_mm);
     const Eigen::Vector3i nearest = at.array().round().cast<int>();
-    const double slow = slowness_[padded_index(nearest.x(), nearest.y(), nearest.z())];
+    const double slow = 1 / speed_.at(nearest.x(), nearest.y(), nearest.z());
     Eigen::Vector3i low, high;
     for (int a = 0; a < 3; ++a) {
       const double reach = options_.source_radius_mm / grid_.spacing_mm[a];
@@ -112,9 +139,8 @@ class March {
           const Eigen::Vector3d voxel(i, j, k);
           const double way = (voxel - at).cwiseProduct(grid_.spacing_mm).norm();
           const bool around = ((voxel - at).array().abs() < 1).all();
-          const std::size_t n = padded_index(i, j, k);
-          if ((way <= options_.source_radius_mm || around) && std::isfinite(slowness_[n]))
-            give(static_cast<std::uint32_t>(n), static_cast<float>(source.time + way * slow));
+          if ((way <= options_.source_radius_mm || around) && speed_.at(i, j, k) > 0)
+            give(static_cast<std::uint32_t>(padded_index(i, j, k)), static_cast<float>(source.time + way * slow));
         }
   }
 
@@ -122,9 +148,10 @@ class March {
     BucketQueue::Entry entry;
     while (queue_.pop(entry)) {
       const std::uint32_t n = entry.voxel;
-      if (state_[n] == known || entry.time != time_[n]) continue;  // an entry it left behind
+      Voxel& voxel = voxels_[n];
+      if (voxel.passed() || entry.time != voxel.time) continue;  // an entry it left behind
       if (entry.time > options_.stop_time) break;
-      state_[n] = known;
+      voxel.pass();
       for (const std::ptrdiff_t stride : strides_) {
         visit(static_cast<std::uint32_t>(n - stride));
         visit(static_cast<std::uint32_t>(n + stride));
@@ -144,17 +171,17 @@ class March {
     return static_cast<std::size_t>((i + rim) + (j + rim) * strides_[1] + (k + rim) * strides_[2]);
   }
   void give(std::uint32_t n, float time) {
-    if (time >= time_[n]) return;
-    time_[n] = time;
-    state_[n] = given;
+    if (time >= voxels_[n].time) return;
+    voxels_[n] = {time, infinite};
     queue_.push(n, time);
   }
   void visit(std::uint32_t n) {
-    if (state_[n] != open || std::isinf(slowness_[n])) return;
+    Voxel& voxel = voxels_[n];
+    if (voxel.passed() || std::isinf(voxel.slowness)) return;
     // The last solution counts, not the smallest: it knows most neighbours, and second differences may raise it.
     const float time = solve(n);
-    if (time == time_[n]) return;
-    time_[n] = time;
+    if (time == voxel.time) return;
+    voxel.time = time;
     queue_.push(n, time);
   }
 
@@ -162,25 +189,25 @@ class March {
   struct Side {
     float a, b, from;
   };
+  float passed_time(std::size_t n) const { return voxels_[n].passed() ? voxels_[n].time : infinite; }
   float solve(std::uint32_t n) const {
     std::array<Side, 3> sides;
     int count = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const std::ptrdiff_t stride = strides_[axis];
-      const float below = state_[n - stride] == known ? time_[n - stride] : infinite;
-      const float above = state_[n + stride] == known ? time_[n + stride] : infinite;
+      const float below = passed_time(n - stride), above = passed_time(n + stride);
       const float nearest = std::min(below, above);
       if (std::isinf(nearest)) continue;
       const std::ptrdiff_t step = below < above ? -stride : stride;
       Side side{inverse_[axis], nearest * inverse_[axis], nearest};
-      if (options_.order == 2 && state_[n + 2 * step] == known && time_[n + 2 * step] <= nearest)
-        side = {1.5f * inverse_[axis], (2 * nearest - 0.5f * time_[n + 2 * step]) * inverse_[axis], nearest};
+      if (const float second = options_.order == 2 ? passed_time(n + 2 * step) : infinite; second <= nearest)
+        side = {1.5f * inverse_[axis], (2 * nearest - 0.5f * second) * inverse_[axis], nearest};
       int at = count++;
       for (; at > 0 && sides[at - 1].from > side.from; --at) sides[at] = sides[at - 1];
       sides[at] = side;
     }
     for (; count > 0; --count) {  // leave out the latest side until the front comes from behind all that are left
-      const float time = root(sides, count, slowness_[n]);
+      const float time = root(sides, count, voxels_[n].slowness);
       if (time >= sides[count - 1].from) return time;
     }
     return infinite;
@@ -202,20 +229,18 @@ class March {
     for (int k = 0; k < grid_.size.z(); ++k)
       for (int j = 0; j < grid_.size.y(); ++j)
         for (int i = 0; i < grid_.size.x(); ++i) {
-          const std::size_t n = padded_index(i, j, k);
-          const bool arrived = state_[n] == known && time_[n] <= options_.stop_time;
-          result.at(i, j, k) = arrived ? time_[n] : infinite;
+          result.at(i, j, k) = passed_time(padded_index(i, j, k));
         }
     return result;
   }
 
+  const Image<float>& speed_;
   const Grid& grid_;
   FastMarchingOptions options_;
   BucketQueue queue_;
   std::array<std::ptrdiff_t, 3> strides_;
   std::array<float, 3> inverse_;
-  std::vector<float> time_, slowness_;
-  std::vector<std::uint8_t> state_;
+  std::vector<Voxel, LargePages<Voxel>> voxels_;
 };
 
 void check(const Image<float>& speed, std::span<const FrontSource> sources, const FastMarchingOptions& options) {
