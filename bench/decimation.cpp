@@ -115,7 +115,12 @@ int run(int argc, char** argv) {
   fmt::print(
       "| method | triangles | quads % | input → output mean / max mm | output → input mean / max mm | volume % | "
       "smallest angle ° | quad deviation ° | crossings | CPU s |\n|---|---|---|---|---|---|---|---|---|---|\n");
+  double bound_mm = 0;
   for (int a = 2; a < argc; ++a) {
+    if (const std::string word = argv[a]; word.starts_with("bound=")) {
+      bound_mm = std::stod(word.substr(6));
+      continue;
+    }
     const int faces = std::stoi(argv[a]);
     double start = cpu_s();
     supine::meshing::QuadRemesher remesher(in, {}, supine::meshing::edge_for_triangles(in, {}, 2 * faces));
@@ -129,7 +134,13 @@ int run(int argc, char** argv) {
     const double seconds = cpu_s() - start;
     const auto triangles = static_cast<int>(result.surface.triangles.rows());
     row(fmt::format("quads, {} faces", faces), measure, result, seconds);
-    if (!getenv("NOPLAIN")) for (const bool vtk : {true, false}) {
+    if (bound_mm > 0) {
+      start = cpu_s();
+      const DecimateResult bounded =
+          supine::meshing::decimate(in, {.max_distance_mm = bound_mm, .target_faces = faces});
+      row(fmt::format("the same, checked, bound {} mm", bound_mm), measure, bounded, cpu_s() - start);
+    }
+    for (const bool vtk : {true, false}) {
       start = cpu_s();
       DecimateResult plain;
       plain.surface = vtk ? vtk_quadrics(in, triangles) : openmesh_quadrics(in, triangles);
@@ -144,7 +155,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    fmt::print(stderr, "usage: bench_decimation SURFACE FACES [FACES ...]\n");
+    fmt::print(stderr, "usage: bench_decimation SURFACE [bound=MM] FACES [FACES ...]\n");
     return 2;
   }
   try {

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""Draws error_map.csv (supine-calibrate --map) as a picture, with the answers of calibration.json files on it.
+"""Draws error_map.csv (supine-calibrate --map) as a picture, with answers of calibration.json files on it.
 
-    bench/study_ridge.py error_map.csv out.png [calibration.json ...]
+    bench/study_ridge.py error_map.csv out.png truth.json [calibration.json ...]
 """
 import csv
 import json
@@ -13,10 +13,11 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import FormatStrFormatter
 
 
-def main(map_file, picture, *answers):
-    with open(map_file, newline="") as stream:
+def read_map(file):
+    with open(file, newline="") as stream:
         rows = list(csv.DictReader(stream))
     names = list(rows[0])[:2]
     x = sorted({float(r[names[0]]) for r in rows})
@@ -25,20 +26,39 @@ def main(map_file, picture, *answers):
     for r in rows:
         if r["failed"] == "0":
             mae[y.index(float(r[names[1]])), x.index(float(r[names[0]]))] = float(r["mae_study_mm"])
-    figure, axes = plt.subplots(figsize=(6, 5), layout="constrained")
+    return x, y, mae
+
+
+def read_json(file):
+    with open(file) as stream:
+        return json.load(stream)
+
+
+def main(map_file, picture, truth_file, *answers):
+    x, y, mae = read_map(map_file)
+    figure, axes = plt.subplots(figsize=(6.4, 4.8), layout="constrained")
     levels = np.geomspace(np.nanmin(mae), np.nanmax(mae), 16)
     filled = axes.contourf(x, y, mae, levels=levels, cmap="viridis_r")
     figure.colorbar(filled, label="MAE model to scan, mm", format="%.2f")
-    for answer in answers:
-        with open(answer) as stream:
-            result = json.load(stream)
-        mark = "k." if result["method"] == "cmaes" else "r*"
-        axes.plot(*[p["value"] for p in result["parameters"][:2]], mark, markersize=5)
-    axes.set(xscale="log", yscale="log", xlabel=names[0], ylabel=names[1])
-    figure.savefig(picture, dpi=130)
+    seen = set()
+    for result in map(read_json, answers):
+        fitted = [p["value"] for p in result["parameters"][:2]]
+        cmaes = result["method"] == "cmaes"
+        name = None if cmaes in seen else "CMA-ES, each start and seed" if cmaes else "least squares, each start"
+        seen.add(cmaes)
+        axes.plot(*fitted, "k." if cmaes else "r*", markersize=5 if cmaes else 11, label=name)
+    truth = read_json(truth_file)["parameters"]
+    axes.plot(truth["Eb"], truth["Es"], "w+", markersize=12, markeredgewidth=2, label="truth")
+    axes.set(xscale="log", yscale="log", xlabel="E breast, kPa", ylabel="E skin, kPa", xlim=(x[0], x[-1]),
+             ylim=(y[0], y[-1]))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FormatStrFormatter("%g"))
+    legend = axes.legend(loc="upper right", facecolor="0.6")
+    legend.get_frame().set_alpha(0.8)
+    figure.savefig(picture, dpi=110)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 3:
+    if len(sys.argv) < 4:
         sys.exit(__doc__)
     main(*sys.argv[1:])

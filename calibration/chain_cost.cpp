@@ -32,7 +32,7 @@ ChainCost::ChainCost(Evaluator& evaluator, const FreeParameters& parameters, con
   Eigen::Index points = 0;
   for (const auto& used : mask_) points += used.count();
   set_num_residuals(static_cast<int>(points) + prior_count(parameters, options));
-  mutable_parameter_block_sizes()->push_back(static_cast<int>(parameters.size()));
+  mutable_parameter_block_sizes()->assign(static_cast<std::size_t>(parameters.size()), 1);
 }
 
 void ChainCost::warm_start(const Eigen::VectorXd& u, const Prediction& prediction, const Linearisation* linearisation) {
@@ -78,36 +78,49 @@ void ChainCost::note(const Eigen::VectorXd& u, bool failed) const {
   if (options_.progress) options_.progress({log_.evaluations, log_.failed, row.rms_mm, best_rms_mm_});
 }
 
-void ChainCost::fill(const Eigen::VectorXd& u, double* residuals) const {
-  const Residuals& r = trial_.residuals;
+Eigen::VectorXd ChainCost::weighted(const State& state) const {
+  Eigen::VectorXd residuals(num_residuals());
+  const Residuals& r = state.residuals;
   for (Eigen::Index i = 0; i < r.size(); ++i)
     residuals[i] = robust_residual(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i];
   Eigen::Index row = r.size();
+  for (Eigen::Index j = 0; j < state.u.size() && row < num_residuals(); ++j)
+    if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)])
+      residuals[row++] = (state.u[j] - prior->mean) / prior->sd;
+  return residuals;
+}
+
+void ChainCost::accept(const Eigen::VectorXd& residuals) const {
+  const Eigen::VectorXd& u = trial_.u;
+  const simulation::Sensitivities sensitivities(evaluator_.chain(), parameters_.model(u), trial_.prediction.solution);
+  trial_.linearisation = linearise(evaluator_, sensitivities, parameters_, u, trial_.prediction, trial_.residuals);
+  trial_.cost = 0.5 * residuals.squaredNorm();
+  trial_.jacobian.setZero(num_residuals(), u.size());
+  const Residuals& r = trial_.residuals;
+  for (Eigen::Index i = 0; i < r.size(); ++i)
+    trial_.jacobian.row(i) =
+        trial_.linearisation.slope.row(i) * (robust_slope(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i]);
+  Eigen::Index row = r.size();
   for (Eigen::Index j = 0; j < u.size() && row < num_residuals(); ++j)
     if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)])
-      residuals[row++] = (u[j] - prior->mean) / prior->sd;
+      trial_.jacobian(row++, j) = 1 / prior->sd;
+  trial_.gradient = trial_.jacobian.transpose() * residuals;
+  trial_.information = trial_.jacobian.transpose() * trial_.jacobian;
+  accepted_ = trial_;
+  if (!log_.history.empty()) log_.history.back().accepted = true;
 }
 
 bool ChainCost::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
-  const Eigen::VectorXd u = Eigen::Map<const Eigen::VectorXd>(parameters[0], parameters_.size());
-  if (!predict(u)) return false;
-  fill(u, residuals);
-  if (jacobians == nullptr || jacobians[0] == nullptr) return true;
-  const simulation::Model model = parameters_.model(u);
-  const simulation::Sensitivities sensitivities(evaluator_.chain(), model, trial_.prediction.solution);
-  trial_.linearisation = linearise(evaluator_, sensitivities, parameters_, u, trial_.prediction, trial_.residuals);
-  accepted_ = trial_;
-  if (!log_.history.empty()) log_.history.back().accepted = true;
-  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> jacobian(
-      jacobians[0], num_residuals(), parameters_.size());
-  jacobian.setZero();
-  const Residuals& r = accepted_.residuals;
-  for (Eigen::Index i = 0; i < r.size(); ++i)
-    jacobian.row(i) =
-        accepted_.linearisation.slope.row(i) * (robust_slope(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i]);
-  Eigen::Index row = r.size();
-  for (Eigen::Index j = 0; j < u.size() && row < num_residuals(); ++j)
-    if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)]) jacobian(row++, j) = 1 / prior->sd;
+  Eigen::VectorXd u(parameters_.size());
+  for (Eigen::Index j = 0; j < u.size(); ++j) u[j] = parameters[j][0];
+  const bool known = accepted_.jacobian.size() > 0 && accepted_.u == u;
+  if (!known && !predict(u)) return false;
+  const Eigen::VectorXd values = weighted(known ? accepted_ : trial_);
+  Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = values;
+  if (jacobians == nullptr) return true;
+  if (!known) accept(values);
+  for (Eigen::Index j = 0; j < u.size(); ++j)
+    if (jacobians[j] != nullptr) Eigen::Map<Eigen::VectorXd>(jacobians[j], num_residuals()) = accepted_.jacobian.col(j);
   return true;
 }
 

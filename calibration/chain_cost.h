@@ -7,10 +7,11 @@
 
 namespace supine::calibration {
 
-/// Ceres' view of one chain run: weighted robust distances and priors, with their Jacobian. Used by least_squares.cpp.
+/// Ceres' view of one chain run: weighted robust distances and priors, with their Jacobian; a block per parameter. Used
+/// by bounded_descent.cpp.
 ///
-/// Ceres asks for a Jacobian at accepted points only, so the solution found there is the one the next trials start
-/// from.
+/// Ceres asks for a Jacobian at accepted points only (with a line search that interpolates values alone), so the
+/// solution found there is the one the next trials start from. Asked again for the accepted point it runs nothing.
 class ChainCost : public ceres::CostFunction {
  public:
   /// @param mask  the points that take part
@@ -28,13 +29,18 @@ class ChainCost : public ceres::CostFunction {
     Prediction prediction;
     Residuals residuals;
     Linearisation linearisation;
+    double cost = 0;              ///< half the sum of squares of what Ceres sees
+    Eigen::MatrixXd jacobian;     ///< of what Ceres sees; empty before the first point was accepted
+    Eigen::VectorXd gradient;     ///< of the cost
+    Eigen::MatrixXd information;  ///< JᵀJ
   };
   const State& accepted() const { return accepted_; }
 
  private:
   bool predict(const Eigen::VectorXd& u) const;
   void note(const Eigen::VectorXd& u, bool failed) const;
-  void fill(const Eigen::VectorXd& u, double* residuals) const;
+  Eigen::VectorXd weighted(const State& state) const;
+  void accept(const Eigen::VectorXd& residuals) const;
 
   Evaluator& evaluator_;
   const FreeParameters& parameters_;

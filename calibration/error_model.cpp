@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <set>
 
 namespace supine::calibration {
 namespace {
@@ -57,14 +58,27 @@ void rate(const Clusters& clusters, const Eigen::MatrixXd& x, const Eigen::Vecto
   candidate.log_likelihood = -0.5 * log_det - freedom * std::log(candidate.nugget_mm);
 }
 
-/// Takes over the most likely of @p trials if it is better than the best so far.
-void improve(const Clusters& clusters, const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
-             std::vector<Candidate>& trials, Candidate& best) {
+/// The likelihood on the grid, each point of it rated once.
+class Ratings {
+ public:
+  Ratings(const Clusters& clusters, const Eigen::MatrixXd& x, const Eigen::VectorXd& y)
+      : clusters_(clusters), x_(x), y_(y) {}
+
+  /// Takes over the most likely of @p trials if it is better than the best so far.
+  void improve(std::vector<Candidate> trials, Candidate& best) {
+    std::erase_if(trials, [this](const Candidate& c) { return !known_.emplace(c.length_mm, c.ratio).second; });
 #pragma omp parallel for schedule(dynamic)
-  for (std::size_t c = 0; c < trials.size(); ++c) rate(clusters, x, y, trials[c]);
-  for (const Candidate& trial : trials)
-    if (trial.log_likelihood > best.log_likelihood + 1e-9) best = trial;
-}
+    for (std::size_t c = 0; c < trials.size(); ++c) rate(clusters_, x_, y_, trials[c]);
+    for (const Candidate& trial : trials)
+      if (trial.log_likelihood > best.log_likelihood + 1e-9) best = trial;
+  }
+
+ private:
+  const Clusters& clusters_;
+  const Eigen::MatrixXd& x_;
+  const Eigen::VectorXd& y_;
+  std::set<std::pair<double, double>> known_;
+};
 
 /// Each point joins the first centre within the radius, or becomes one; in the order of place.
 Clusters clusters_of(const Residuals& residuals, const std::vector<int>& order, double radius_mm) {
@@ -139,13 +153,14 @@ ErrorModel fit_error_model(const Residuals& residuals, const Eigen::MatrixXd& sl
   Candidate best{lengths_mm[0], 0};
   rate(clusters, x, y, best);
   best.length_mm = 18;
+  Ratings ratings(clusters, x, y);
   for (double before = -std::numeric_limits<double>::infinity(); best.log_likelihood > before;) {
     before = best.log_likelihood;
     std::vector<Candidate> row, column;
     for (const double spread : spreads) row.push_back({best.length_mm, spread});
-    improve(clusters, x, y, row, best);
+    ratings.improve(row, best);
     for (const double length : lengths_mm) column.push_back({length, best.ratio});
-    if (best.ratio > 0) improve(clusters, x, y, column, best);
+    if (best.ratio > 0) ratings.improve(column, best);
   }
   return {best.nugget_mm, best.ratio * best.nugget_mm, best.length_mm};
 }

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "calibration/least_squares.h"
 
-#include <ceres/manifold.h>
-#include <ceres/problem.h>
-#include <ceres/solver.h>
 #include <fmt/format.h>
 
 #include <cmath>
 #include <limits>
 #include <random>
 
-#include "calibration/chain_cost.h"
+#include "calibration/bounded_descent.h"
 #include "common/error.h"
 
 namespace supine::calibration {
@@ -19,54 +16,6 @@ namespace {
 constexpr int most_mask_changes = 3;
 constexpr double mask_share = 0.01;           // of the points may change sides after a descent
 constexpr double spread_without_prior = 0.7;  // of further starts, in coordinates: a factor of two in a modulus
-
-ceres::Solver::Options solver_options(const FitOptions& options, bool rough) {
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_QR;
-  solver.max_num_iterations = options.max_iterations;
-  // Of a cost of about half the number of points: 1e-3 standard deviations; for profiles a tenth of one is enough.
-  solver.function_tolerance = rough ? 1e-4 : 1e-6;
-  solver.parameter_tolerance = 1e-6;
-  solver.gradient_tolerance = 1e-8;
-  solver.max_num_consecutive_invalid_steps = 8;
-  solver.logging_type = ceres::SILENT;
-  return solver;
-}
-
-/// One descent with a fixed set of points. Bounds of held coordinates close in on their value.
-void descend(Evaluator& evaluator, const FreeParameters& parameters, const FitOptions& options, int start,
-             const std::vector<bool>& held, const Linearisation* linearisation, Fit& fit) {
-  ChainCost cost(evaluator, parameters, options, fit.mask, fit, start);
-  cost.warm_start(fit.u, fit.prediction, linearisation);
-  ceres::Problem::Options ownership;
-  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ceres::Problem problem(ownership);
-  Eigen::VectorXd u = fit.u;
-  problem.AddResidualBlock(&cost, nullptr, u.data());
-  for (int i = 0; i < u.size(); ++i) {
-    const bool fixed = !held.empty() && held[static_cast<std::size_t>(i)];
-    if (fixed) continue;
-    problem.SetParameterLowerBound(u.data(), i, parameters.lower()[i]);
-    problem.SetParameterUpperBound(u.data(), i, parameters.upper()[i]);
-  }
-  std::vector<int> constant;
-  for (int i = 0; i < u.size(); ++i)
-    if (!held.empty() && held[static_cast<std::size_t>(i)]) constant.push_back(i);
-  if (constant.size() == static_cast<std::size_t>(u.size()))
-    throw InputError("every parameter is held: nothing to fit");
-  if (!constant.empty()) problem.SetManifold(u.data(), new ceres::SubsetManifold(static_cast<int>(u.size()), constant));
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver_options(options, !held.empty()), &problem, &summary);
-  if (cost.accepted().residuals.size() == 0) throw NumericalFailure("no equilibrium at the start of the fit");
-  fit.u = cost.accepted().u;
-  fit.prediction = cost.accepted().prediction;
-  fit.residuals = cost.accepted().residuals;
-  fit.linearisation = cost.accepted().linearisation;
-  fit.cost = summary.final_cost;
-  fit.iterations += static_cast<int>(summary.iterations.size()) - 1;
-  fit.converged = summary.termination_type == ceres::CONVERGENCE;
-  fit.message = summary.message;
-}
 
 bool alike(const PointMask& a, const PointMask& b) {
   Eigen::Index changed = 0, all = 0;
@@ -87,7 +36,7 @@ void search(Evaluator& evaluator, const FreeParameters& parameters, const FitOpt
     const PointMask mask = points_over_skin(fit.prediction);
     if (pass > 0 && alike(mask, fit.mask)) return;
     fit.mask = mask;
-    descend(evaluator, parameters, options, start, {}, pass > 0 ? &fit.linearisation : nullptr, fit);
+    descend(evaluator, parameters, options, start, {}, pass > 0 ? &fit.linearisation : nullptr, false, fit);
   }
 }
 
@@ -167,7 +116,7 @@ Fit refit(Evaluator& evaluator, const FreeParameters& parameters, const FitOptio
   fit.prediction = evaluator.predict(parameters.model(u), &near);
   FitOptions few = options;
   few.max_iterations = std::min(options.max_iterations, 4);
-  descend(evaluator, parameters, few, 0, held, &from.linearisation, fit);
+  descend(evaluator, parameters, few, 0, held, &from.linearisation, true, fit);
   return fit;
 }
 

@@ -52,8 +52,7 @@ struct Fit {
   std::vector<double> start_costs;  ///< final cost of every descent; NaN where the start had no equilibrium
 };
 
-/// Bounded nonlinear least squares (Ceres, Levenberg-Marquardt with projection) on the signed distances scan → model,
-/// with exact sensitivities:
+/// Bounded nonlinear least squares (bounded_descent.h) on the signed distances scan → model, with exact sensitivities:
 ///   min ½ Σ g(d_i)²/σ_i² + ½ Σ (u_j − m_j)²/s_j²,   ½ g(d)² = δ² (√(1 + (d/δ)²) − 1)   (pseudo-Huber, δ = robust_mm).
 /// Which scan points take part is decided at the start of a descent and again at its end, until 99 % of them stay.
 /// A trial without equilibrium is a rejected step. Each run starts at the last accepted shape, moved along the

@@ -1,42 +1,64 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/diagnose.h"
 
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
+
+#include "diagnosis/chi_squared.h"
 
 namespace supine::diagnosis {
 namespace {
 
-constexpr double floor_factor = 1.1;  // held-out RMS within this of the noise: nothing is left to explain
-
-bool is_measurement_effect(const std::string& effect) {
-  return effect == "misregistration" || effect == "gravity_tilt" || effect == "segmentation_offset";
+bool improves(double held_out_mm, const BaseFigures& base, const VerdictRules& rules) {
+  const double fall = base.held_out_rms_mm - held_out_mm;
+  if (fall >= rules.held_out_mm && fall >= rules.held_out_share * base.held_out_rms_mm) return true;
+  const double noise = base.noise_mm * base.noise_mm, before = std::pow(base.held_out_rms_mm, 2) - noise;
+  return before > 0 && std::pow(held_out_mm, 2) - noise <= (1 - rules.excess_share) * before;
 }
 
-bool improves(double held_out_mm, double base_held_out_mm, const VerdictRules& rules) {
-  const double fall = base_held_out_mm - held_out_mm;
-  return fall >= rules.held_out_mm && fall >= rules.held_out_share * base_held_out_mm;
+/// Over the poses that were not fitted; the base model's where a refit has none.
+double pose_rms(const std::vector<double>& poses) {
+  double sum = 0;
+  for (const double p : poses) sum += p * p;
+  return std::sqrt(sum / static_cast<double>(poses.size()));
 }
 
-/// The best, and those that cannot be told from it: nearly as good a score, or the same direction and a fall as well.
-std::vector<std::string> rivals(const ScoreTable& table, const Score& best, const VerdictRules& rules) {
-  std::vector<std::string> set;
-  const auto& twins = best.not_told_apart_from;
-  for (const Score& score : table.scores) {
-    if (!improves(score.predicted_held_out_rms_mm, table.base_held_out_rms_mm, rules)) continue;
-    const bool twin = std::find(twins.begin(), twins.end(), score.effect) != twins.end();
-    if (best.bic - score.bic < rules.bic || (twin && score.bic > 0)) set.push_back(score.effect);
+bool comes_near(const Refit& refit, const Refit& best, double misfit, const VerdictRules& rules) {
+  const bool near = best.bic - refit.bic < rules.bic * std::max(1.0, misfit);
+  if (refit.pose_rms_mm.empty() || best.pose_rms_mm.empty()) return near;
+  const double own = pose_rms(refit.pose_rms_mm), its = pose_rms(best.pose_rms_mm);
+  // A pose that neither was fitted to judges both: it can tell apart what the fitted one cannot, and bring back what
+  // the fitted one had put aside too surely.
+  return near ? own < (1 + rules.pose_share) * its : own < its;
+}
+
+double p_of(const ScoreTable& table) {
+  double p = 1;
+  for (const Score& score : table.scores) p = std::min(p, score.p_value);
+  return p;
+}
+
+/// Polynomials in q up to degree 6, of the points of one pose each.
+Eigen::MatrixXd smooth_shapes(const calibration::Residuals& residuals) {
+  constexpr int degree = 6;
+  const int poses = residuals.pose.maxCoeff() + 1, each = (degree + 1) * (degree + 2) / 2;
+  Eigen::MatrixXd shapes = Eigen::MatrixXd::Zero(residuals.size(), poses * each);
+  for (Eigen::Index r = 0; r < residuals.size(); ++r) {
+    int column = residuals.pose[r] * each;
+    for (int a = 0; a <= degree; ++a)
+      for (int b = 0; a + b <= degree; ++b)
+        shapes(r, column++) = std::pow(residuals.q(r, 0), a) * std::pow(residuals.q(r, 1), b);
   }
-  std::stable_partition(set.begin(), set.end(), is_measurement_effect);
-  return set;
+  return shapes;
 }
 
-/// Nothing was named: because nothing is left, or because nothing fits?
-void leave_open(FirstDiagnosis& result, double noise_mm, const VerdictRules& rules) {
-  const ScoreTable& t = result.table;
-  const bool significant = !t.scores.empty() && t.scores.front().p_value < rules.p_value;
-  if (!significant || t.base_held_out_rms_mm <= floor_factor * noise_mm) return;
-  result.verdict = Verdict::unexplained;
-  result.missing = {t.scores.front().effect};
+Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& columns) {
+  if (columns.cols() == 0) return columns;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), qr.rank());
 }
 
 }  // namespace
@@ -55,46 +77,61 @@ std::string verdict_name(Verdict verdict) {
   return {};
 }
 
-FirstDiagnosis decide(ScoreTable table, ScoreTable white, std::vector<std::string> unseen, double noise_mm,
-                      const VerdictRules& rules) {
-  FirstDiagnosis result{Verdict::nothing_missing, {}, std::move(table), std::move(white), std::move(unseen), {}};
-  const ScoreTable& t = result.table;
-  const auto accepted = std::find_if(t.scores.begin(), t.scores.end(), [&t, &rules](const Score& s) {
-    return s.p_value < rules.p_value && improves(s.predicted_held_out_rms_mm, t.base_held_out_rms_mm, rules);
-  });
-  if (accepted != t.scores.end()) {
-    result.missing = rivals(t, *accepted, rules);
-    result.verdict = result.missing.size() == 1 ? Verdict::missing : Verdict::ambiguous;
-    return result;
-  }
-  leave_open(result, noise_mm, rules);
-  return result;
+bool is_measurement_effect(const std::string& effect) {
+  return effect == "misregistration" || effect == "gravity_tilt" || effect == "segmentation_offset" ||
+         effect == "incompressibility";
 }
 
-FirstDiagnosis decide(ScoreTable table, ScoreTable white, std::vector<std::string> unseen, std::vector<Refit> refits,
-                      double noise_mm, const VerdictRules& rules) {
-  FirstDiagnosis result{Verdict::nothing_missing, {}, std::move(table), std::move(white), std::move(unseen),
-                        std::move(refits)};
-  const ScoreTable& t = result.table;
-  const auto by_chance = [&t, &rules](const std::string& effect) {
-    for (const Score& score : t.scores)
-      if (score.effect == effect) return score.p_value >= rules.p_value;
-    return true;
+LackOfFit lack_of_fit(const WeightedFit& fit, const Metric& metric) {
+  const calibration::Fit& f = fit.fit;
+  const Eigen::VectorXd white = metric.whitening->apply(f.residuals.distance_mm + metric.mean_mm);
+  const Eigen::MatrixXd absorbed = orthonormal(metric.whitening->apply(f.linearisation.slope));
+  Eigen::MatrixXd shapes = metric.whitening->apply(smooth_shapes(f.residuals));
+  shapes -= absorbed * (absorbed.transpose() * shapes);
+  const Eigen::MatrixXd free = orthonormal(shapes);
+  LackOfFit left;
+  left.misfit = white.squaredNorm() / static_cast<double>(white.size() - absorbed.cols());
+  left.p_value = chi_squared_above(static_cast<int>(free.cols()), (free.transpose() * white).squaredNorm());
+  return left;
+}
+
+Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, const std::vector<LackOfFit>& left,
+                 const BaseFigures& base, const VerdictRules& rules) {
+  Diagnosis result;
+  result.left = base.left;
+  const auto real = [&rules](const LackOfFit& l) {
+    return l.p_value < rules.lack_of_fit_p && l.misfit > rules.lack_of_fit_misfit;
   };
-  std::vector<Refit> good;
-  for (const Refit& refit : result.refits)
-    if (refit.solved && !by_chance(refit.effect) && improves(refit.held_out_rms_mm, t.base_held_out_rms_mm, rules))
-      good.push_back(refit);
-  std::stable_sort(good.begin(), good.end(),
-                   [](const Refit& a, const Refit& b) { return a.held_out_rms_mm < b.held_out_rms_mm; });
-  for (const Refit& refit : good)
-    if (refit.held_out_rms_mm <= (1 + rules.rival_share) * good.front().held_out_rms_mm)
-      result.missing.push_back(refit.effect);
+  const double p = p_of(table);
+  if (p >= rules.p_value && !real(base.left)) {
+    result.why =
+        fmt::format("errors of scan, registration and mesh alone score as high as the best effect (p {:.3f})", p);
+    return result;
+  }
+  std::vector<const Refit*> good;
+  for (const Refit& refit : refits)
+    if (refit.finished && refit.bic > 0 && improves(refit.held_out_rms_mm, base, rules)) good.push_back(&refit);
+  if (good.empty()) {
+    result.why = "no effect of the catalogue lowers the held-out error";
+    if (!real(base.left)) return result;
+    result.verdict = Verdict::unexplained;
+    if (!refits.empty()) result.missing = {refits.front().effect};
+    return result;
+  }
+  const Refit& best = *good.front();
+  result.left = left[static_cast<std::size_t>(&best - refits.data())];
+  for (const Refit* refit : good)
+    if (refit == &best || comes_near(*refit, best, result.left.misfit, rules)) result.missing.push_back(refit->effect);
+  if (real(result.left)) {
+    result.verdict = Verdict::unexplained;
+    result.missing = {best.effect};
+    result.why = fmt::format("best of the catalogue, but it leaves {:.1f} times what errors would (p {:.2g})",
+                             result.left.misfit, result.left.p_value);
+    return result;
+  }
   std::stable_partition(result.missing.begin(), result.missing.end(), is_measurement_effect);
-  if (result.missing.empty())
-    leave_open(result, noise_mm, rules);
-  else
-    result.verdict = result.missing.size() == 1 ? Verdict::missing : Verdict::ambiguous;
+  result.verdict = result.missing.size() == 1 ? Verdict::missing : Verdict::ambiguous;
+  result.why = result.verdict == Verdict::missing ? "no other effect comes near" : "these do equally well";
   return result;
 }
 

@@ -13,35 +13,50 @@ enum class Verdict { nothing_missing, missing, ambiguous, unexplained };
 /// nothing_missing, missing, ambiguous, unexplained.
 std::string verdict_name(Verdict verdict);
 
-/// The first answer, from linearised scores and, where they were made, refits.
-struct FirstDiagnosis {
-  Verdict verdict;
-  std::vector<std::string> missing;  ///< one; the whole set when ambiguous, measurement effects first; best when
-                                     ///< unexplained
-  ScoreTable table;                  ///< under errors that neighbouring points share
-  ScoreTable white;                  ///< under white noise: what a naive test would say
-  std::vector<std::string> unseen;   ///< effects that move no fitted point
-  std::vector<Refit> refits;         ///< of the candidates that were refitted
-};
+/// Causes that lie in the measurement or in the numbers, not in the breast: named first where several do as well.
+bool is_measurement_effect(const std::string& effect);
 
-/// Bounds of the verdict (docs/supine-diagnose.md).
+/// Bounds of the verdict (docs/diagnosis.md).
 struct VerdictRules {
   double p_value = 0.05;         ///< of the best candidate, over the whole catalogue
   double held_out_share = 0.05;  ///< the held-out RMS must fall by this share
   double held_out_mm = 0.05;     ///< and by this much
-  double bic = 6;                ///< without refits: candidates within this of the best cannot be told from it
-  double rival_share = 0.03;     ///< with refits: those whose held-out RMS is within this share of the best
+  double excess_share = 0.3;     ///< or by this share of what it has above the noise, in squares
+  double bic = 6;                ///< candidates within this of the best cannot be told from it, times the misfit left
+  double pose_share = 0.05;      ///< and neither can those that predict a held-out pose better, or within this share
+  double lack_of_fit_p = 0.01;   ///< what is left after the best is more than errors
+  double lack_of_fit_misfit = 1.6;  ///< and this many times what errors would leave on the mean
 };
 
-/// Names an effect only when its score could not come from any candidate by chance and the held-out error is predicted
-/// to fall; names every candidate that does as well.
-/// @param noise_mm  the scanner's, to say whether anything is left to explain
-FirstDiagnosis decide(ScoreTable table, ScoreTable white, std::vector<std::string> unseen, double noise_mm,
-                      const VerdictRules& rules = {});
+/// What is left of a model after its fit.
+struct LackOfFit {
+  double misfit = 1;   ///< data part of F per degree of freedom; 1 when all is explained
+  double p_value = 1;  ///< of smooth shapes over the skin (28 polynomials in q, per pose), χ²
+};
 
-/// The same with the errors of refits instead of predicted ones: of the refitted candidates, those whose held-out error
-/// falls enough; the best, and all that come close to it. Its score must not be one that chance gives (p).
-FirstDiagnosis decide(ScoreTable table, ScoreTable white, std::vector<std::string> unseen, std::vector<Refit> refits,
-                      double noise_mm, const VerdictRules& rules = {});
+LackOfFit lack_of_fit(const WeightedFit& fit, const Metric& metric);
+
+/// The base model as refits are compared with it.
+struct BaseFigures {
+  double rms_mm = 0, held_out_rms_mm = 0, noise_mm = 0;
+  std::vector<double> pose_rms_mm;  ///< poses that were not fitted
+  LackOfFit left;
+};
+
+struct Diagnosis {
+  Verdict verdict = Verdict::nothing_missing;
+  std::vector<std::string> missing;  ///< the one; the whole set when ambiguous; the best when unexplained
+  std::string why;                   ///< one sentence
+  LackOfFit left;                    ///< after the best
+};
+
+/// nothing_missing  no score that chance would not give (p), or nothing that lowers the held-out error
+/// missing          one refit lowers the held-out error and no other comes near
+/// ambiguous        several do, measurement effects first
+/// unexplained      the residual is real, and either nothing lowers the held-out error or the best leaves much of it
+/// @param refits  best first; of them only finished ones count
+/// @param left    lack of fit of each refit
+Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, const std::vector<LackOfFit>& left,
+                 const BaseFigures& base, const VerdictRules& rules = {});
 
 }  // namespace supine::diagnosis

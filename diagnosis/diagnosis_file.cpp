@@ -34,6 +34,19 @@ void add_strings(vtkPolyData* to, const char* name, const std::vector<std::strin
   to->GetFieldData()->AddArray(array);
 }
 
+void write(vtkPolyData* poly, const std::filesystem::path& file) {
+  add_strings(poly, "frame", {"LPS"});
+  add_strings(poly, "unit", {"mm"});
+  bool written = std::ofstream(file).is_open();  // VTK would print its own complaint
+  if (written) {
+    vtkNew<vtkXMLPolyDataWriter> writer;
+    writer->SetFileName(file.c_str());
+    writer->SetInputData(poly);
+    written = writer->Write() == 1 && writer->GetErrorCode() == 0;
+  }
+  if (!written) throw InputError(fmt::format("{}: cannot be written (disk full, or no permission?)", file.string()));
+}
+
 }  // namespace
 
 void write_diagnosis(const calibration::Residuals& residuals, const std::vector<std::string>& poses,
@@ -57,16 +70,37 @@ void write_diagnosis(const calibration::Residuals& residuals, const std::vector<
   poly->GetPointData()->AddArray(pose);
   for (const auto& [effect, shape] : shapes) add_numbers(poly, "shape_" + effect + "_mm", shape);
   add_strings(poly, "poses", poses);
-  add_strings(poly, "frame", {"LPS"});
-  add_strings(poly, "unit", {"mm"});
-  bool written = std::ofstream(file).is_open();  // VTK would print its own complaint
-  if (written) {
-    vtkNew<vtkXMLPolyDataWriter> writer;
-    writer->SetFileName(file.c_str());
-    writer->SetInputData(poly);
-    written = writer->Write() == 1 && writer->GetErrorCode() == 0;
+  write(poly, file);
+}
+
+void write_error_map(const calibration::ModelSkin& skin, const SkinError& error, const calibration::SkinAreas& areas,
+                     const std::filesystem::path& file) {
+  vtkNew<vtkPolyData> poly;
+  vtkNew<vtkPoints> places;
+  places->SetDataTypeToDouble();
+  const std::vector<int>& nodes = skin.nodes();
+  std::vector<vtkIdType> row(static_cast<std::size_t>(skin.distance().points().rows()), -1);
+  for (const int node : nodes)
+    row[static_cast<std::size_t>(node)] = places->InsertNextPoint(skin.distance().points().row(node).data());
+  vtkNew<vtkCellArray> cells;
+  for (Eigen::Index t = 0; t < skin.triangles().rows(); ++t) {
+    vtkIdType corners[3];
+    for (int k = 0; k < 3; ++k) corners[k] = row[static_cast<std::size_t>(skin.triangles()(t, k))];
+    cells->InsertNextCell(3, corners);
   }
-  if (!written) throw InputError(fmt::format("{}: cannot be written (disk full, or no permission?)", file.string()));
+  poly->SetPoints(places);
+  poly->SetPolys(cells);
+  add_numbers(poly, "distance_mm", error.mean_mm(nodes));
+  poly->GetPointData()->SetActiveScalars("distance_mm");
+  add_numbers(poly, "standard_error_mm", error.error_mm(nodes));
+  if (!areas.names.empty()) {
+    vtkNew<vtkIntArray> area;
+    area->SetName("area");
+    for (const int node : nodes) area->InsertNextValue(areas.of_point[node]);
+    poly->GetPointData()->AddArray(area);
+    add_strings(poly, "area_names", areas.names);
+  }
+  write(poly, file);
 }
 
 }  // namespace supine::diagnosis

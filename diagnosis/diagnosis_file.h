@@ -5,6 +5,7 @@
 
 #include "calibration/residuals.h"
 #include "diagnosis/candidates.h"
+#include "diagnosis/hot_spots.h"
 
 namespace supine::diagnosis {
 
@@ -15,6 +16,11 @@ namespace supine::diagnosis {
 /// @throws InputError  when the file cannot be written
 void write_diagnosis(const calibration::Residuals& residuals, const std::vector<std::string>& poses,
                      const std::vector<std::pair<std::string, Eigen::VectorXd>>& shapes,
+                     const std::filesystem::path& file);
+
+/// Writes the skin of the model in one pose with the point arrays `distance_mm` (smoothed, NaN where no scan point is
+/// near), `standard_error_mm` and `area` (row of the field data `area_names`). @throws InputError  as above
+void write_error_map(const calibration::ModelSkin& skin, const SkinError& error, const calibration::SkinAreas& areas,
                      const std::filesystem::path& file);
 
 }  // namespace supine::diagnosis

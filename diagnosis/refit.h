@@ -1,37 +1,64 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
-#include "calibration/least_squares.h"
 #include "diagnosis/score_test.h"
+#include "diagnosis/weighted_fit.h"
 
 namespace supine::diagnosis {
+
+/// A parameter of a refit, with its 95 % interval under Σ, cut at its range.
+struct FittedParameter {
+  std::string name, unit;
+  double value, low, high;
+};
 
 /// A candidate added to the model and everything free fitted again, nonlinearly.
 struct Refit {
   std::string effect;
-  bool solved = false;  ///< whether the chain found an equilibrium with it; nothing below holds otherwise
-  std::vector<std::string> parameters;
-  Eigen::VectorXd values;
-  double rms_mm = 0, held_out_rms_mm = 0;  ///< of the points that were fitted; every block of skin without itself
-  int evaluations = 0;
+  bool solved = false;    ///< whether the chain found an equilibrium with it; nothing below holds otherwise
+  bool finished = false;  ///< whether it was followed to the end, or given up early as hopeless
+  int freedom = 0;        ///< parameters of the effect
+  double gain = 0;        ///< fall of F from the base model's
+  double bic = 0;         ///< gain − freedom · ln n
+  double rms_mm = 0, held_out_rms_mm = 0;   ///< fitted points; every block of skin without itself
+  std::vector<double> pose_rms_mm;          ///< of every pose that was not fitted
+  std::vector<FittedParameter> parameters;  ///< of the effect
+  simulation::Model model;                  ///< with the fitted numbers
+  WeightedFit fit;
 };
 
-/// The effect as supine-model add writes it: its strength free, from the catalogue's median (from the one-step size
-/// where no sign is likelier), with the catalogue's spread and bounds; its place and shape fixed.
-simulation::EffectSetting typical_setting(const std::string& effect, const Score& score, const Candidate& candidate);
+/// The effect with its strength free and without a prior, because how large it usually is shall not decide whether it
+/// is there; its place and shape free with the catalogue's prior, because where they are not known the strength is not
+/// either.
+simulation::EffectSetting free_setting(const std::string& effect);
 
-/// Refits candidates one after the other, from the base fit.
-/// @param which  effects to refit
-std::vector<Refit> refit_candidates(calibration::Evaluator& evaluator, const simulation::Model& model,
-                                    const calibration::FitOptions& options, const calibration::Fit& base,
-                                    const std::vector<Candidate>& candidates, const ScoreTable& table,
-                                    const std::vector<std::string>& which);
+/// What all refits start from.
+struct RefitProblem {
+  calibration::Scene scene;        ///< fitted poses
+  calibration::Scene whole;        ///< and those that were not, after them
+  const simulation::Model* model;  ///< the base model at its optimum
+  const WeightedFit* base;
+  const Metric* metric;
+  double log_points;                                 ///< ln n of the BIC
+  std::function<void(const std::string&)> progress;  ///< may be empty; called by any thread, one at a time
+};
 
-/// The first @p count effects of either table, without those of the wrong sign: correlated and white scores err in
-/// different ways.
-std::vector<std::string> worth_refitting(const ScoreTable& table, const ScoreTable& white, std::size_t count);
+/// By how much F would fall if the change that the effect makes at its usual size were scaled freely and the base model
+/// fitted again: for each candidate of one parameter whose usual size is not its null, else NaN. What acts far from
+/// linearly (ligament, adhesion) shows itself here where the slope at the null points elsewhere. One solve each.
+std::vector<double> secant_statistics(const RefitProblem& problem, const std::vector<Candidate>& candidates);
+
+/// Refits candidates side by side: each from the catalogue's usual size and from its one-step size, whichever starts
+/// better; three steps for all, to the end for those whose F comes within reach of the best.
+std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vector<Candidate>& candidates,
+                                    const ScoreTable& table, const std::vector<std::string>& which);
+
+/// Root mean square distance of each pose that is not fitted.
+std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model,
+                                    const simulation::ChainSolution& near);
 
 }  // namespace supine::diagnosis

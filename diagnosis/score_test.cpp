@@ -7,6 +7,7 @@
 #include <random>
 
 #include "calibration/held_out.h"
+#include "diagnosis/chi_squared.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -18,8 +19,6 @@ constexpr double implausible = 3;
 constexpr int null_draws = 1000;
 
 double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
-
-double normal_above(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
 
 /// Orthonormal basis of the column space.
 Eigen::MatrixXd basis(const Eigen::MatrixXd& columns) {
@@ -146,15 +145,6 @@ class Scorer {
 };
 
 }  // namespace
-
-double chi_squared_power(int freedom, double lambda) {
-  const double q = freedom, c = 2 / (9 * q);
-  const double quantile = q * std::pow(1 - c + 1.644854 * std::sqrt(c), 3);
-  const double a = q + lambda, b = q + 2 * lambda;
-  const double h = 1 - 2 * a * (q + 3 * lambda) / (3 * b * b), p = b / (a * a), m = (h - 1) * (1 - 3 * h);
-  const double mean = 1 + h * p * (h - 1 - 0.5 * (2 - h) * m * p), sd = h * std::sqrt(2 * p) * (1 + 0.5 * m * p);
-  return normal_above((std::pow(quantile / a, h) - mean) / sd);
-}
 
 ScoreTable score_candidates(const Residuals& residuals, const Eigen::MatrixXd& slope,
                             const std::vector<Candidate>& candidates, const Whitening& whitening, unsigned seed) {

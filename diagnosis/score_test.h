@@ -44,8 +44,4 @@ struct ScoreTable {
 ScoreTable score_candidates(const calibration::Residuals& residuals, const Eigen::MatrixXd& slope,
                             const std::vector<Candidate>& candidates, const Whitening& whitening, unsigned seed);
 
-/// Chance that a χ² of @p freedom degrees and noncentrality @p lambda exceeds its central 95 % quantile
-/// (Sankaran 1963; quantile by Wilson and Hilferty 1931); within 0.01.
-double chi_squared_power(int freedom, double lambda);
-
 }  // namespace supine::diagnosis

@@ -19,21 +19,41 @@ Whitening Whitening::correlated(const calibration::Residuals& residuals, const c
   Whitening whitening;
   whitening.clusters_ = calibration::cluster_points(residuals, most);
   const calibration::Clusters& clusters = whitening.clusters_;
-  const double nugget = errors.nugget_mm * errors.nugget_mm, shared = errors.spread_mm * errors.spread_mm;
-  const Eigen::Index count = clusters.members.size();
-  Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(count, count);
-#pragma omp parallel for schedule(static)
-  for (Eigen::Index i = 0; i < count; ++i) {
-    sigma(i, i) = nugget / clusters.members[i] + shared;
-    for (Eigen::Index j = 0; j < i; ++j)
-      if (clusters.pose[i] == clusters.pose[j])
-        sigma(i, j) = shared * std::exp(-(clusters.place.row(i) - clusters.place.row(j)).norm() / errors.length_mm);
-  }
-  whitening.factor_.compute(sigma);  // reads the lower half
-  if (whitening.factor_.info() != Eigen::Success)
-    throw NumericalFailure("the covariance of the scan's errors is not positive; are there points twice in the scan?");
+  whitening.factorise(errors.nugget_mm * errors.nugget_mm * clusters.members.cwiseInverse(),
+                      errors.spread_mm * errors.spread_mm, errors.length_mm, {});
   whitening.effective_points_ = errors.effective_count(residuals);
   return whitening;
+}
+
+Whitening Whitening::of(const calibration::Residuals& residuals, const ErrorSources& sources, Eigen::Index most) {
+  Whitening whitening;
+  whitening.clusters_ = calibration::cluster_points(residuals, most);
+  const calibration::Clusters& clusters = whitening.clusters_;
+  const Eigen::VectorXd variance = clusters.means(sources.noise_mm.cwiseAbs2());
+  Eigen::MatrixXd modes(residuals.size(), static_cast<Eigen::Index>(sources.modes.size()));
+  for (std::size_t m = 0; m < sources.modes.size(); ++m)
+    modes.col(static_cast<Eigen::Index>(m)) = sources.modes[m].shape_mm;
+  whitening.factorise(variance.cwiseQuotient(clusters.members), sources.spread_mm * sources.spread_mm,
+                      sources.length_mm, clusters.means(modes));
+  const calibration::ErrorModel errors{std::sqrt(variance.mean()), sources.spread_mm, sources.length_mm};
+  whitening.effective_points_ = errors.effective_count(residuals);
+  return whitening;
+}
+
+void Whitening::factorise(Eigen::VectorXd nugget, double shared, double length_mm, const Eigen::MatrixXd& modes) {
+  const Eigen::Index count = nugget.size();
+  Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(count, count);
+  if (modes.size() > 0) sigma.noalias() = modes * modes.transpose();
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index i = 0; i < count; ++i) {
+    sigma(i, i) += nugget[i] + shared;
+    for (Eigen::Index j = 0; j < i; ++j)
+      if (clusters_.pose[i] == clusters_.pose[j])
+        sigma(i, j) += shared * std::exp(-(clusters_.place.row(i) - clusters_.place.row(j)).norm() / length_mm);
+  }
+  factor_.compute(sigma);  // reads the lower half
+  if (factor_.info() != Eigen::Success)
+    throw NumericalFailure("the covariance of the scan's errors is not positive; are there points twice in the scan?");
 }
 
 Eigen::MatrixXd Whitening::apply(const Eigen::MatrixXd& columns) const {

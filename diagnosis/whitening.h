@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calibration/error_model.h"
+#include "diagnosis/error_sources.h"
 
 namespace supine::diagnosis {
 
@@ -18,6 +19,9 @@ class Whitening {
   static Whitening correlated(const calibration::Residuals& residuals, const calibration::ErrorModel& errors,
                               Eigen::Index most = 900);
 
+  /// Σ of all sources, on the means of clusters. effective_points() is that of noise and spread, without the modes.
+  static Whitening of(const calibration::Residuals& residuals, const ErrorSources& sources, Eigen::Index most = 600);
+
   Eigen::MatrixXd apply(const Eigen::MatrixXd& columns) const;
   /// Independent points these errors are worth, (tr Σ)²/tr(Σ²), of all the residuals.
   double effective_points() const { return effective_points_; }
@@ -25,6 +29,8 @@ class Whitening {
   const calibration::Clusters& clusters() const { return clusters_; }
 
  private:
+  void factorise(Eigen::VectorXd nugget, double shared, double length_mm, const Eigen::MatrixXd& modes);
+
   Eigen::VectorXd sigma_;               // independent
   calibration::Clusters clusters_;      // correlated
   Eigen::LLT<Eigen::MatrixXd> factor_;  // correlated

@@ -7,8 +7,7 @@
 
 #include "common/error.h"
 #include "meshing/decimate_methods.h"
-#include "reconstruction/mesh_edges.h"
-#include "reconstruction/surface_check.h"
+#include "meshing/sound_surface.h"
 
 namespace supine::meshing {
 namespace {
@@ -56,26 +55,6 @@ bool drop_unused_points(const Surface& in, const DecimateOptions& options, Surfa
   return true;
 }
 
-// An open surface: manifold, and not crossing itself.
-void require_sheet(const Surface& in) {
-  const std::string what = "the surface to decimate";
-  const reconstruction::SurfaceReport report = reconstruction::check_surface(in);
-  if (report.border_edges == 0) return reconstruction::require_solid(in, what);
-  const auto place = [&in](Eigen::Index p) {
-    return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", in.points(p, 0), in.points(p, 1), in.points(p, 2));
-  };
-  if (!report.manifold())
-    throw InputError(
-        fmt::format("{}: not a manifold: {} edges and {} points where more than two sheets meet or the orientation "
-                    "changes, the first at {}; repair the surface there",
-                    what, report.bad_edges, report.bad_points, place(report.first_bad_point)));
-  const auto crossings = reconstruction::self_intersections(in);
-  if (!crossings.empty())
-    throw InputError(
-        fmt::format("{}: intersects itself: {} pairs of triangles, the first at {}; repair the surface there", what,
-                    crossings.size(), place(in.triangles(crossings.front().first, 0))));
-}
-
 }  // namespace
 
 void DecimateOptions::check() const {
@@ -94,10 +73,7 @@ void DecimateOptions::check() const {
 
 DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
   options.check();
-  if (options.open)
-    require_sheet(in);
-  else
-    reconstruction::require_solid(in, "the surface to decimate");
+  require_sound(in, options.open ? Borders::allowed : Borders::closed, "the surface to decimate");
   if (options.relative_size.size() != 0 && options.relative_size.size() != in.points.rows())
     throw InputError(fmt::format("there are {} relative sizes for {} points of the surface; one each is needed",
                                  options.relative_size.size(), in.points.rows()));

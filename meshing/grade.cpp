@@ -39,6 +39,17 @@ std::vector<Eigen::Vector3d> border_places(const Surface& surface, double spacin
   return places;
 }
 
+// The fine places remeshed, with the volume of before.
+Surface refined(const Surface& surface, double mean_mm, const std::vector<FinePlace>& fine) {
+  if (fine.empty()) return surface;
+  Surface graded = refine(surface, mean_mm, fine);
+  const reconstruction::SurfaceReport wanted = reconstruction::check_surface(surface);
+  const reconstruction::SurfaceReport now = reconstruction::check_surface(graded);
+  graded.points += (wanted.volume_mm3 - now.volume_mm3) / now.area_mm2 *
+                   reconstruction::point_normals(graded.points, graded.triangles);
+  return graded;
+}
+
 }  // namespace
 
 Surface refine_skin_edge(const Surface& surface, double edge_mm) {
@@ -50,13 +61,19 @@ Surface refine_skin_edge(const Surface& surface, double edge_mm) {
   std::vector<FinePlace> fine;
   for (const Eigen::Vector3d& place : border_places(surface, mean_mm / std::exp2(levels)))
     for (int level = 1; level <= levels; ++level) fine.push_back({place, level});
-  if (fine.empty()) return surface;
-  Surface graded = refine(surface, mean_mm, fine);
-  const reconstruction::SurfaceReport wanted = reconstruction::check_surface(surface);
-  const reconstruction::SurfaceReport now = reconstruction::check_surface(graded);
-  graded.points += (wanted.volume_mm3 - now.volume_mm3) / now.area_mm2 *
-                   reconstruction::point_normals(graded.points, graded.triangles);
-  return graded;
+  return refined(surface, mean_mm, fine);
+}
+
+Surface refine_to_sizes(const Surface& surface, const SizeField& sizes) {
+  const double mean_mm = mean_edge_mm(surface);
+  std::vector<FinePlace> fine;
+  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (int c = 0; c < 3; ++c) centre += surface.points.row(surface.triangles(t, c)).transpose() / 3;
+    const int levels = std::clamp(static_cast<int>(std::lround(std::log2(mean_mm / sizes.at(centre)))), 0, most_levels);
+    for (int level = 1; level <= levels; ++level) fine.push_back({centre, level});
+  }
+  return refined(surface, mean_mm, fine);
 }
 
 }  // namespace supine::meshing

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include "meshing/size_field.h"
 #include "reconstruction/surface.h"
 
 namespace supine::meshing {
@@ -15,5 +16,9 @@ namespace supine::meshing {
 ///   where there is no such border
 /// @throws InputError  edge_mm <= 0
 reconstruction::Surface refine_skin_edge(const reconstruction::Surface& surface, double edge_mm);
+
+/// Remeshes a surface so that its edges are as short as the size field asks for, down to an eighth of the mean edge;
+/// nowhere longer than they are. @return the same surface, regions and topology
+reconstruction::Surface refine_to_sizes(const reconstruction::Surface& surface, const SizeField& sizes);
 
 }  // namespace supine::meshing

@@ -16,11 +16,13 @@ constexpr int rounds = 12;
 
 class Star {
  public:
-  explicit Star(TetMesh& mesh) : mesh_(mesh), cells_(mesh.points.rows()), movable_(mesh.points.rows(), true) {
+  Star(TetMesh& mesh, const Triangles& walls)
+      : mesh_(mesh), cells_(mesh.points.rows()), movable_(mesh.points.rows(), true) {
     for (int c = 0; c < mesh.cells.rows(); ++c) {
       for (int k = 0; k < 4; ++k) cells_[mesh.cells(c, k)].push_back(c);
     }
     for (Eigen::Index i = 0; i < mesh.faces.size(); ++i) movable_[mesh.faces.data()[i]] = false;
+    for (Eigen::Index i = 0; i < walls.size(); ++i) movable_[walls.data()[i]] = false;
   }
 
   bool movable(int point) const { return movable_[point]; }
@@ -85,8 +87,8 @@ class Star {
 
 }  // namespace
 
-void move_points(TetMesh& mesh, double wanted_deg) {
-  Star star(mesh);
+void move_points(TetMesh& mesh, double wanted_deg, const Triangles& walls) {
+  Star star(mesh, walls);
   for (int round = 0; round < rounds; ++round) {
     std::vector<int> points;
     for (int c = 0; c < mesh.cells.rows(); ++c) {

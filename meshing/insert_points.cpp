@@ -45,7 +45,8 @@ struct Fan {
 
 class Workshop {
  public:
-  explicit Workshop(const TetMesh& mesh) : points_(mesh.points.rows()), tets_(mesh.cells.rows()) {
+  Workshop(const TetMesh& mesh, const Triangles& walls) : points_(mesh.points.rows()), tets_(mesh.cells.rows()) {
+    for (Eigen::Index t = 0; t < walls.rows(); ++t) walls_.insert(sorted({walls(t, 0), walls(t, 1), walls(t, 2)}));
     for (Eigen::Index p = 0; p < mesh.points.rows(); ++p) points_[p] = mesh.points.row(p);
     for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
       for (int k = 0; k < 4; ++k) tets_[c][k] = mesh.cells(c, k);
@@ -160,7 +161,10 @@ class Workshop {
       }
     }
     for (const auto& [key, entry] : faces) {
-      if (entry.first > 1) continue;
+      if (entry.first > 1) {
+        if (walls_.contains(key)) return std::nullopt;
+        continue;
+      }
       cavity.shell.push_back(entry.second);
       shell_corners.insert(key.begin(), key.end());
     }
@@ -214,13 +218,14 @@ class Workshop {
 
   std::vector<Point> points_;
   std::vector<Tet> tets_;
+  std::set<Face> walls_;
   std::vector<std::vector<int>> cells_of_point_;
 };
 
 }  // namespace
 
-int insert_points(TetMesh& mesh, double wanted_deg) {
-  Workshop workshop(mesh);
+int insert_points(TetMesh& mesh, double wanted_deg, const Triangles& walls) {
+  Workshop workshop(mesh, walls);
   int added = 0;
   for (int round = 0; round < rounds; ++round) {
     const int now = workshop.pass(wanted_deg);

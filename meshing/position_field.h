@@ -10,7 +10,7 @@ namespace supine::meshing {
 /// 2015, section 4.2, extrinsic), nodes on region borders stay on them, corners are nodes.
 /// Colour by colour as the cross field: the result does not depend on the number of threads.
 /// @return nodes, mm, one per point of level 0
-Points position_field(const std::vector<FieldGraph>& levels, const CrossField& crosses, int sweeps = 6);
+Points position_field(const std::vector<FieldGraph>& levels, const CrossField& crosses, int sweeps = 12);
 
 /// The sizes of all levels times a factor.
 void scale_sizes(std::vector<FieldGraph>& levels, double factor);

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <boost/graph/adjacency_list.hpp>
+#include <boost/graph/max_cardinality_matching.hpp>
 #include <cmath>
 #include <numbers>
 #include <tuple>
@@ -18,7 +20,6 @@ using reconstruction::MeshEdge;
 using reconstruction::Surface;
 
 constexpr double largest_bend_deg = 60;  // between the two triangles of a quad
-constexpr int longest_path = 12;         // pairs that may change for one pair more
 
 double degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
@@ -89,71 +90,34 @@ std::vector<Pair> possible_pairs(const Surface& surface, double largest_deviatio
   return pairs;
 }
 
-class Matching {
- public:
-  Matching(Eigen::Index triangles, const std::vector<Pair>& pairs) : next_(triangles), partner(triangles, -1) {
-    for (const Pair& pair : pairs) {
-      next_[pair.a].push_back(pair.b);
-      next_[pair.b].push_back(pair.a);
-      if (partner[pair.a] < 0 && partner[pair.b] < 0) {
-        partner[pair.a] = pair.b;
-        partner[pair.b] = pair.a;
-      }
-    }
-  }
+using Graph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS>;
+using Mates = std::vector<boost::graph_traits<Graph>::vertex_descriptor>;
+using MateMap = Mates::value_type*;
+using Numbers = boost::property_map<Graph, boost::vertex_index_t>::const_type;
 
-  // Shortest alternating path from a triangle alone to another, breadth first; pairs along it change over.
-  bool augment(int from) {
-    std::vector<std::array<int, 3>> queue{{from, -1, 0}};  // triangle, row it came from, pairs so far
-    std::vector<int> seen{from};
-    for (std::size_t i = 0; i < queue.size(); ++i) {
-      const auto [t, before, depth] = queue[i];
-      for (const int middle : next_[t]) {
-        if (std::find(seen.begin(), seen.end(), middle) != seen.end()) continue;
-        if (partner[middle] < 0) {
-          change_over(queue, static_cast<int>(i), middle);
-          return true;
-        }
-        const int beyond = partner[middle];
-        if (depth >= longest_path || std::find(seen.begin(), seen.end(), beyond) != seen.end()) continue;
-        seen.push_back(middle);
-        seen.push_back(beyond);
-        via_.resize(partner.size(), -1);
-        via_[beyond] = middle;
-        queue.push_back({beyond, static_cast<int>(i), depth + 1});
-      }
-    }
-    return false;
-  }
-
- private:
-  void change_over(const std::vector<std::array<int, 3>>& queue, int row, int last) {
-    while (row >= 0) {
-      const int t = queue[row][0], middle = queue[row][1] >= 0 ? via_[t] : -1;
-      partner[t] = last;
-      partner[last] = t;
-      last = middle;
-      row = queue[row][1];
-    }
-  }
-
-  std::vector<std::vector<int>> next_;
-  std::vector<int> via_;
-
- public:
-  std::vector<int> partner;
-};
+// Partner of every triangle, or −1. Starts from the pairs in their order, the squarest first, and changes them over
+// along alternating paths until no more can be formed (Edmonds 1965, by Boost).
+std::vector<int> largest_matching(Eigen::Index triangles, const std::vector<Pair>& pairs) {
+  Graph graph(static_cast<std::size_t>(triangles));
+  for (const Pair& pair : pairs) boost::add_edge(pair.a, pair.b, graph);
+  Mates mates(static_cast<std::size_t>(triangles));
+  boost::matching<Graph, MateMap, Numbers, boost::edmonds_augmenting_path_finder, boost::greedy_matching,
+                  boost::no_matching_verifier>(graph, mates.data(), boost::get(boost::vertex_index, graph));
+  std::vector<int> partner(mates.size(), -1);
+  for (std::size_t t = 0; t < mates.size(); ++t)
+    if (mates[t] != boost::graph_traits<Graph>::null_vertex()) partner[t] = static_cast<int>(mates[t]);
+  return partner;
+}
 
 }  // namespace
 
 QuadPairs pair_triangles(const Surface& surface, double largest_deviation_deg) {
-  Matching matching(surface.triangles.rows(), possible_pairs(surface, largest_deviation_deg));
+  const std::vector<int> partner =
+      largest_matching(surface.triangles.rows(), possible_pairs(surface, largest_deviation_deg));
   const auto count = static_cast<int>(surface.triangles.rows());
-  for (int t = 0; t < count; ++t)
-    if (matching.partner[t] < 0) matching.augment(t);
   QuadPairs result{Eigen::VectorXi::Constant(count, -1)};
   for (int t = 0; t < count; ++t) {
-    const int other = matching.partner[t];
+    const int other = partner[t];
     if (other < 0) ++result.alone;
     if (other > t) result.quad(t) = result.quad(other) = result.quads++;
   }

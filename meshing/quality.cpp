@@ -75,6 +75,8 @@ double measure_curved(const TetMesh& mesh, Eigen::Index c, QualityReport& report
   if (report.worst_jacobian_cell < 0 || jacobian < report.min_scaled_jacobian) {
     report.worst_jacobian_cell = static_cast<int>(c);
     report.min_scaled_jacobian = jacobian;
+    report.worst_jacobian_place_mm =
+        Eigen::RowVector3d(mesh.points(mesh.cells.row(c).head(4), Eigen::all).colwise().mean()).transpose();
   }
   if (!(jacobian > 0)) ++report.inverted;
   return curved_volume_mm3(nodes);
@@ -99,10 +101,15 @@ QualityReport measure_quality(const TetMesh& mesh) {
       ++report.inverted;
     else if (mesh.order() == 2)
       v = measure_curved(mesh, c, report);
-    report.min_dihedral_deg = std::min(report.min_dihedral_deg, low);
+    if (report.smallest_angle_cell < 0 || low < report.min_dihedral_deg) {
+      report.min_dihedral_deg = low;
+      report.smallest_angle_cell = static_cast<int>(c);
+      report.smallest_angle_place_mm = x.colwise().mean().transpose();
+    }
     report.max_dihedral_deg = std::max(report.max_dihedral_deg, high);
     ++report.smallest_dihedral[std::min(17, static_cast<int>(low / 10))];
     ++report.largest_dihedral[std::min(17, static_cast<int>(high / 10))];
+    ++report.radius_ratio[std::clamp(static_cast<int>(ratio * 10), 0, 9)];
     report.mean_radius_ratio += ratio / static_cast<double>(report.cells);
     if (ratio < report.min_radius_ratio) {
       report.min_radius_ratio = ratio;

@@ -27,11 +27,15 @@ struct QualityReport {
   double min_dihedral_deg = 180, max_dihedral_deg = 0;
   std::array<Eigen::Index, 18> smallest_dihedral{};  ///< cells whose smallest angle lies in [10 i, 10 i + 10) degrees
   std::array<Eigen::Index, 18> largest_dihedral{};   ///< the same of the largest
+  int smallest_angle_cell = -1;                      ///< the one with min_dihedral_deg
+  Eigen::Vector3d smallest_angle_place_mm = Eigen::Vector3d::Zero();
   double min_radius_ratio = 1, mean_radius_ratio = 0;
+  std::array<Eigen::Index, 10> radius_ratio{};               ///< cells with it in [i, i + 1) tenths; <= 0 in the first
   double min_scaled_jacobian = 1, mean_scaled_jacobian = 1;  ///< of quadratic cells, lower bounds (jacobian.h)
   std::array<Eigen::Index, 10> scaled_jacobian{};  ///< quadratic cells with it in [i, i + 1) tenths; <= 0 in the first
   int worst_jacobian_cell = -1;                    ///< -1 in linear meshes
-  int worst_cell = -1;                             ///< the one with the smallest radius ratio
+  Eigen::Vector3d worst_jacobian_place_mm = Eigen::Vector3d::Zero();
+  int worst_cell = -1;  ///< the one with the smallest radius ratio
   Eigen::Vector3d worst_place_mm = Eigen::Vector3d::Zero();
   double volume_ml = 0;
   Eigen::VectorXd tissue_ml;         ///< by segmentation::Tissue, from the fractions

@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #define TETLIBRARY
@@ -15,6 +17,8 @@
 
 namespace supine::meshing {
 namespace {
+
+constexpr double circumradius_share = 0.7;  // of the edge; TetGen bounds circumradii, a regular tetrahedron has 0.61
 
 void fill_input(tetgenio& in, const reconstruction::Surface& surface) {
   in.firstnumber = 0;
@@ -35,6 +39,42 @@ void fill_input(tetgenio& in, const reconstruction::Surface& surface) {
   }
 }
 
+// The grid as a background mesh: six tetrahedra round the diagonal of each box, the size as metric of each node.
+void fill_background(tetgenio& background, const SizeField& sizes) {
+  background.firstnumber = 0;
+  background.numberofpoints = static_cast<int>(sizes.size_mm.size());
+  background.pointlist = new REAL[3 * sizes.size_mm.size()];  // tetgenio frees all of these
+  background.numberofpointmtrs = 1;
+  background.pointmtrlist = new REAL[sizes.size_mm.size()];
+  for (int z = 0; z < sizes.count.z(); ++z)
+    for (int y = 0; y < sizes.count.y(); ++y)
+      for (int x = 0; x < sizes.count.x(); ++x) {
+        const Eigen::Index n = sizes.node(x, y, z);
+        Eigen::Map<Eigen::Vector3d>(background.pointlist + 3 * n) = sizes.place(x, y, z);
+        background.pointmtrlist[n] = circumradius_share * sizes.size_mm[n];
+      }
+  const Eigen::Vector3i boxes = sizes.count.array() - 1;
+  background.numberofcorners = 4;
+  background.numberoftetrahedra = 6 * boxes.prod();
+  background.tetrahedronlist = new int[4 * background.numberoftetrahedra];
+  int* corner = background.tetrahedronlist;
+  for (int z = 0; z < boxes.z(); ++z)
+    for (int y = 0; y < boxes.y(); ++y)
+      for (int x = 0; x < boxes.x(); ++x)
+        for (const auto& [first, second] : {std::pair{0, 1}, {1, 0}, {1, 2}, {2, 1}, {2, 0}, {0, 2}}) {
+          Eigen::Vector3i at(x, y, z);
+          std::array<int, 4> tet;
+          tet[0] = static_cast<int>(sizes.node(at.x(), at.y(), at.z()));
+          at[first] += 1;
+          tet[1] = static_cast<int>(sizes.node(at.x(), at.y(), at.z()));
+          at[second] += 1;
+          tet[2] = static_cast<int>(sizes.node(at.x(), at.y(), at.z()));
+          tet[3] = static_cast<int>(sizes.node(x + 1, y + 1, z + 1));
+          if ((second - first + 3) % 3 == 2) std::swap(tet[1], tet[2]);  // one handedness for all
+          corner = std::copy(tet.begin(), tet.end(), corner);
+        }
+}
+
 const char* meaning(int error) {
   switch (error) {
     case 1:
@@ -52,14 +92,17 @@ const char* meaning(int error) {
 
 }  // namespace
 
-TetgenResult call_tetgen(const reconstruction::Surface& surface, const TetgenBounds& bounds) {
-  tetgenio in, out;
+TetgenResult call_tetgen(const reconstruction::Surface& surface, const TetgenBounds& bounds, const SizeField* sizes) {
+  tetgenio in, out, background;
   fill_input(in, surface);
-  // p: fill a surface, Y: keep its triangles, A: number what it separates, q and a: bounds, O: optimise, Q: quiet.
+  if (sizes) fill_background(background, *sizes);
+  // p: fill a surface, Y: keep its triangles, A: number what it separates, q and a: bounds, O: optimise, Q: quiet,
+  // m: edge lengths of the background.
   std::string switches =
       fmt::format("pYAQq{:.6g}/{:.6g}a{:.9f}O7/7", bounds.radius_edge, bounds.min_dihedral_deg, bounds.max_volume_mm3);
+  if (sizes) switches += "m";
   try {
-    tetrahedralize(switches.data(), &in, &out);
+    tetrahedralize(switches.data(), &in, &out, nullptr, sizes ? &background : nullptr);
   } catch (int error) {
     throw NumericalFailure(
         fmt::format("TetGen (switches {}) stopped with error {}: {}", switches, error, meaning(error)));

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include "common/arrays.h"
+#include "meshing/size_field.h"
 #include "reconstruction/surface.h"
 
 namespace supine::meshing {
@@ -20,7 +21,9 @@ struct TetgenBounds {
 };
 
 /// Fills the hull of a surface without self-intersections, its triangles kept.
+/// @param sizes  edge lengths wanted in space; none when null
 /// @throws NumericalFailure  with what TetGen's error number means
-TetgenResult call_tetgen(const reconstruction::Surface& surface, const TetgenBounds& bounds);
+TetgenResult call_tetgen(const reconstruction::Surface& surface, const TetgenBounds& bounds,
+                         const SizeField* sizes = nullptr);
 
 }  // namespace supine::meshing

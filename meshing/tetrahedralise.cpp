@@ -8,10 +8,12 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "common/error.h"
 #include "meshing/improve.h"
+#include "meshing/sound_surface.h"
 #include "meshing/tetgen_call.h"
 #include "meshing/topology.h"
 #include "reconstruction/surface_check.h"
@@ -37,18 +39,18 @@ std::map<Corners, int> triangle_numbers(const Surface& surface) {
   return numbers;
 }
 
-// Cells on the inner side of the surface; those of its cavities are dropped.
+// Cells on the inner side of the surface; those of its cavities, which see triangles from behind, are dropped.
 Indices inside_cells(const TetgenResult& filled, const std::map<Corners, int>& triangles) {
-  std::set<int> inside;
+  std::set<int> outside;
   for (Eigen::Index c = 0; c < filled.cells.rows(); ++c) {
     for (const auto& face : tet_faces) {
-      const Corners corners = {filled.cells(c, face[0]), filled.cells(c, face[1]), filled.cells(c, face[2])};
-      if (triangles.contains(turned(corners))) inside.insert(filled.chamber[c]);
+      const Corners behind = {filled.cells(c, face[0]), filled.cells(c, face[2]), filled.cells(c, face[1])};
+      if (triangles.contains(turned(behind))) outside.insert(filled.chamber[c]);
     }
   }
   std::vector<int> kept;
   for (Eigen::Index c = 0; c < filled.cells.rows(); ++c) {
-    if (inside.contains(filled.chamber[c])) kept.push_back(static_cast<int>(c));
+    if (!outside.contains(filled.chamber[c])) kept.push_back(static_cast<int>(c));
   }
   return filled.cells(kept, Eigen::all);
 }
@@ -80,7 +82,7 @@ TetMesh assemble(const TetgenResult& filled, const Surface& surface) {
   return mesh;
 }
 
-void drop_unused_points(TetMesh& mesh) {
+void drop_unused_points(TetMesh& mesh, Triangles& walls) {
   std::vector<int> number(mesh.points.rows(), -1), used;
   for (Eigen::Index i = 0; i < mesh.cells.size(); ++i) number[mesh.cells.data()[i]] = 0;
   for (int p = 0; p < mesh.points.rows(); ++p) {
@@ -93,6 +95,54 @@ void drop_unused_points(TetMesh& mesh) {
   for (Indices* rows : {&mesh.cells, &mesh.faces}) {
     for (Eigen::Index i = 0; i < rows->size(); ++i) rows->data()[i] = number[rows->data()[i]];
   }
+  for (Eigen::Index i = 0; i < walls.size(); ++i) walls.data()[i] = number[walls.data()[i]];
+}
+
+// TetGen promises to keep all triangles; those inside are no faces of the mesh, so that assemble() does not see them.
+void require_walls(const TetMesh& mesh, const Triangles& walls) {
+  std::set<Corners> faces;
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c)
+    for (const auto& f : tet_faces)
+      faces.insert(turned({mesh.cells(c, f[0]), mesh.cells(c, f[1]), mesh.cells(c, f[2])}));
+  for (Eigen::Index t = 0; t < walls.rows(); ++t) {
+    if (faces.contains(turned({walls(t, 0), walls(t, 1), walls(t, 2)}))) continue;
+    const Eigen::RowVector3d p = mesh.points.row(walls(t, 0));
+    throw NumericalFailure(fmt::format(
+        "TetGen did not keep a triangle of an interface near ({:.2f}, {:.2f}, {:.2f}) mm", p.x(), p.y(), p.z()));
+  }
+}
+
+SizeField scaled(const SizeField& sizes, double factor) {
+  SizeField result = sizes;
+  result.size_mm *= factor;
+  return result;
+}
+
+// TetGen's filling with about so many cells, of several tries the nearest.
+TetgenResult filled_to_count(const Surface& all, const Inside& inside, const TetrahedraliseOptions& options,
+                             double volume_mm3, double edge_mm) {
+  // A bound on the volume gives cells of a little over half of it on average; a regular tetrahedron has edge³ / (6 √2).
+  const double regular = edge_mm * edge_mm * edge_mm / (6 * std::sqrt(2.0));
+  double bound = options.cells == 0 ? 1.7 * regular : 1.7 * volume_mm3 / static_cast<double>(options.cells);
+  if (inside.sizes) bound = volume_mm3;  // the sizes alone decide
+  double factor = 1, best_miss = 1e300;
+  TetgenResult filled;
+  for (int pass = 0; pass < (options.cells == 0 ? 1 : 4); ++pass) {
+    std::optional<SizeField> sizes;
+    if (inside.sizes) sizes = scaled(*inside.sizes, factor);
+    TetgenResult tried =
+        call_tetgen(all, {options.radius_edge, options.min_dihedral_deg, bound}, sizes ? &*sizes : nullptr);
+    const double ratio =
+        options.cells == 0 ? 1 : static_cast<double>(tried.cells.rows()) / static_cast<double>(options.cells);
+    const double miss = std::abs(std::log(ratio));
+    if (miss < best_miss) {
+      best_miss = miss;
+      filled = std::move(tried);
+    }
+    if (best_miss < 0.05) break;
+    (inside.sizes ? factor : bound) *= std::pow(ratio, inside.sizes ? 0.4 : 1.2);
+  }
+  return filled;
 }
 
 void check_input(const Surface& surface, const std::string& what) {
@@ -108,7 +158,7 @@ void check_input(const Surface& surface, const std::string& what) {
         "is expected",
         what, t, p.x(), p.y(), p.z(), surface.region[t]));
   }
-  reconstruction::require_solid(surface, what);
+  require_sound(surface, Borders::closed, what);
 }
 
 }  // namespace
@@ -136,32 +186,25 @@ double mean_edge_mm(const Surface& surface) {
 }
 
 TetMesh tetrahedralise(const Surface& surface, const TetrahedraliseOptions& options, const std::string& what) {
+  return tetrahedralise(surface, Inside{}, options, what).mesh;
+}
+
+FilledMesh tetrahedralise(const Surface& surface, const Inside& inside, const TetrahedraliseOptions& options,
+                          const std::string& what) {
   options.check();
   check_input(surface, what);
+  const Surface all = inside.interfaces.empty() ? surface : with_interfaces(surface, inside.interfaces, what);
   const double volume = reconstruction::check_surface(surface).volume_mm3;
   const double edge = options.edge_mm > 0 ? options.edge_mm : mean_edge_mm(surface);
-  // A bound on the volume gives cells of a little over half of it on average; a regular tetrahedron has edge³ / (6 √2).
-  const double regular = edge * edge * edge / (6 * std::sqrt(2.0));
-  double bound = options.cells == 0 ? 1.7 * regular : 1.7 * volume / static_cast<double>(options.cells);
-  TetgenResult filled;
-  double best_miss = 1e300;
-  for (int pass = 0; pass < (options.cells == 0 ? 1 : 4); ++pass) {
-    TetgenResult tried = call_tetgen(surface, {options.radius_edge, options.min_dihedral_deg, bound});
-    const double ratio =
-        options.cells == 0 ? 1 : static_cast<double>(tried.cells.rows()) / static_cast<double>(options.cells);
-    const double miss = std::abs(std::log(ratio));
-    if (miss < best_miss) {
-      best_miss = miss;
-      filled = std::move(tried);
-    }
-    if (best_miss < 0.05) break;
-    bound *= std::pow(ratio, 1.2);
-  }
-  TetMesh mesh = assemble(filled, surface);
-  drop_unused_points(mesh);
-  move_points(mesh);
-  if (insert_points(mesh) > 0) move_points(mesh);
-  return mesh;
+  FilledMesh result;
+  result.mesh = assemble(filled_to_count(all, inside, options, volume, edge), surface);
+  Triangles walls = all.triangles.bottomRows(all.triangles.rows() - surface.triangles.rows());
+  drop_unused_points(result.mesh, walls);
+  require_walls(result.mesh, walls);
+  move_points(result.mesh, 20, walls);
+  if (insert_points(result.mesh, 16, walls) > 0) move_points(result.mesh, 20, walls);
+  result.enclosing = enclosing_interfaces(result.mesh, walls, inside.interfaces);
+  return result;
 }
 
 }  // namespace supine::meshing

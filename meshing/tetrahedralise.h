@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <string>
 
+#include "meshing/interfaces.h"
+#include "meshing/size_field.h"
 #include "meshing/tet_mesh.h"
 #include "reconstruction/surface.h"
 
@@ -26,6 +28,22 @@ struct TetrahedraliseOptions {
 /// @throws NumericalFailure  TetGen gave up; what it said
 TetMesh tetrahedralise(const reconstruction::Surface& surface, const TetrahedraliseOptions& options,
                        const std::string& what = "the surface");
+
+/// What else tetrahedra are to follow.
+struct Inside {
+  std::vector<Interface> interfaces;  ///< no tetrahedron crosses them
+  const SizeField* sizes = nullptr;   ///< edge lengths; scaled until the number of cells is options.cells
+};
+
+struct FilledMesh {
+  TetMesh mesh;
+  Eigen::VectorXi enclosing;  ///< by cell: the interface around it (enclosing_interfaces), or −1
+};
+
+/// The same with interfaces inside and edge lengths that change from place to place.
+/// @throws InputError  also with_interfaces
+FilledMesh tetrahedralise(const reconstruction::Surface& surface, const Inside& inside,
+                          const TetrahedraliseOptions& options, const std::string& what = "the surface");
 
 /// Edge length of the tetrahedra that fit a surface: its triangles' mean edge, mm.
 double mean_edge_mm(const reconstruction::Surface& surface);

@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include "common/error.h"
+#include "simulation/folds.h"
 
 namespace supine::simulation {
 namespace {
 
 constexpr int max_corrections = 60;  // fixed point
 constexpr double correction_tolerance_mm = 1e-3;
+constexpr double second_shape_bound_mm = 1e-3;  // two balanced shapes this close are one
 
 void check_prone_gravity(const PoseLoad& prone, const meshing::Anatomy& anatomy) {
   const double along = prone.gravity.dot(anatomy.outward);
@@ -22,18 +24,27 @@ void check_prone_gravity(const PoseLoad& prone, const meshing::Anatomy& anatomy)
       prone.gravity.x(), prone.gravity.y(), prone.gravity.z(), n.x(), n.y(), n.z()));
 }
 
-/// Smallest det F of the final state, corners included. @throws NumericalFailure  naming the inverted cell
-double checked_min_det_f(const meshing::TetMesh& mesh, const Points& x, const Points& X, const std::string& what) {
+/// Notes smallest det F at the quadrature points and the cells folded in @p x or @p X.
+/// @throws NumericalFailure  naming the cell that is inverted at a quadrature point
+void check_cells(const meshing::TetMesh& mesh, const Points& x, const Points& X, const std::string& what,
+                 SolveReport& report) {
   Eigen::Index cell = 0;
-  const double least = cell_det_f(mesh.cells, x, X).minCoeff(&cell);
-  if (least > 0) return least;
+  report.min_det_f = cell_det_f_at_points(mesh.cells, x, X).minCoeff(&cell);
+  if (report.min_det_f > 0) return;
   Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
   for (int a = 0; a < 4; ++a) centre += 0.25 * x.row(mesh.cells(cell, a));
-  throw NumericalFailure(
-      fmt::format("{}: cell {} at ({:.1f}, {:.1f}, {:.1f}) mm is turned inside out at a corner (det F = {:.3g}); make "
-                  "the mesh finer "
-                  "there or raise breast.young_modulus_kpa",
-                  what, cell, centre.x(), centre.y(), centre.z(), least));
+  throw NumericalFailure(fmt::format(
+      "{}: cell {} at ({:.1f}, {:.1f}, {:.1f}) mm is turned inside out (det F = {:.3g}); make the mesh finer there or "
+      "raise breast.young_modulus_kpa",
+      what, cell, centre.x(), centre.y(), centre.z(), report.min_det_f));
+}
+
+/// Notes and names the cells of a shape that fold between quadrature points.
+void note_folds(const meshing::TetMesh& mesh, const Points& shape, const std::string& name, SolveReport& report,
+                std::vector<std::string>& warnings) {
+  const Folds folds = find_folds(mesh.cells, shape);
+  report.folded_cells = folds.cells;
+  if (folds.cells > 0) warnings.push_back(folds_warning(name, folds));
 }
 
 Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
@@ -61,14 +72,16 @@ ChainSolution Chain::solve(const Model& model, const ChainSolution* near, Invers
   const Eigen::VectorXd offset = values_of(fields(model, poses_[0])).imaged_offset;
   solution.prone = mesh.points + Eigen::Map<const Points>(offset.data(), mesh.points.rows(), 3);
   undeformed(model, method, near, solution);
-  solution.inverse.min_det_f = checked_min_det_f(mesh, solution.prone, solution.X, "undeformed");
+  check_cells(mesh, solution.prone, solution.X, "undeformed", solution.inverse);
+  note_folds(mesh, solution.X, "undeformed", solution.inverse, solution.warnings);
   for (std::size_t p = 1; p < poses_.size(); ++p) {
     load(model, poses_[p]);
     Points start;
     if (near != nullptr) start = solution.X + (near->poses[p - 1].x - near->X);
     PoseSolution pose{poses_[p].name, {}, {}};
     pose.report = solver_.forward(solution.X, pose.x, "undeformed → " + pose.name, near != nullptr ? &start : nullptr);
-    pose.report.min_det_f = checked_min_det_f(mesh, pose.x, solution.X, pose.name);
+    check_cells(mesh, pose.x, solution.X, pose.name, pose.report);
+    note_folds(mesh, pose.x, pose.name, pose.report, solution.warnings);
     solution.poses.push_back(std::move(pose));
   }
   return solution;
@@ -82,6 +95,29 @@ void Chain::certify(const Model& model, ChainSolution& solution) {
   const Eigen::VectorXd error = (solution.round_trip.x - solution.prone).rowwise().norm();
   solution.round_trip_max_mm = error.maxCoeff();
   solution.round_trip_rms_mm = std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
+  if (!mechanics_.has_energy()) look_for_second_shapes(model, solution);
+}
+
+void Chain::look_for_second_shapes(const Model& model, ChainSolution& solution) {
+  for (std::size_t p = 1; p < poses_.size(); ++p) {
+    PoseSolution& pose = solution.poses[p - 1];
+    load(model, poses_[p]);
+    Points other;
+    try {
+      solver_.forward(solution.X, other, "prone → " + pose.name, &solution.prone);
+    } catch (const NumericalFailure&) {
+      continue;  // that way leads nowhere: no second shape
+    }
+    Eigen::Index node = 0;
+    const double distance = (other - pose.x).rowwise().norm().maxCoeff(&node);
+    if (distance <= second_shape_bound_mm) continue;
+    pose.second_shape_mm = distance;
+    solution.warnings.push_back(fmt::format(
+        "{}: two balanced shapes, {:.2f} mm apart at ({:.1f}, {:.1f}, {:.1f}) mm: one is reached from the undeformed "
+        "shape, the other from the prone one, and forces without an energy (breast.law = corotational_qr, friction) "
+        "cannot say which holds; use breast.law = \"corotational\", or raise breast.young_modulus_kpa",
+        pose.name, distance, pose.x(node, 0), pose.x(node, 1), pose.x(node, 2)));
+  }
 }
 
 void Chain::undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution) {

@@ -24,6 +24,10 @@ struct PoseSolution {
   std::string name;
   Points x;  ///< mm
   SolveReport report;
+  /// Largest distance to another balanced shape, that the solver reaches from the prone one; 0 where there is none.
+  /// Looked for by Chain::certify() and only where forces have no energy (corotational_qr, friction): with one, the
+  /// solver goes downhill.
+  double second_shape_mm = 0;
 };
 
 struct ChainSolution {
@@ -34,6 +38,7 @@ struct ChainSolution {
   PoseSolution round_trip;          ///< prone again, from X and no load; filled by Chain::certify()
   double round_trip_max_mm = 0;     ///< its largest distance to the known shape
   double round_trip_rms_mm = 0;
+  std::vector<std::string> warnings;  ///< what a user must know of the answer
 };
 
 /// prone (imaged) → undeformed → every other pose, for one mesh and one kind of model (laws, boundary kinds), as often
@@ -57,7 +62,8 @@ class Chain {
   ChainSolution solve(const Model& model, const ChainSolution* near = nullptr,
                       InverseMethod method = InverseMethod::newton);
 
-  /// Makes the round trip: loads solution.X with prone gravity, from no load.
+  /// Makes the round trip: loads solution.X with prone gravity, from no load. Where forces have no energy it also looks
+  /// for a second balanced shape of every pose.
   void certify(const Model& model, ChainSolution& solution);
 
   /// Fields of one pose with the derivative with respect to @p varied (make_fields).
@@ -68,6 +74,7 @@ class Chain {
   void load(const Model& model, const PoseLoad& pose);
   void undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
   void correct(const Model& model, ChainSolution& solution);
+  void look_for_second_shapes(const Model& model, ChainSolution& solution);
 
   std::vector<PoseLoad> poses_;
   Mechanics mechanics_;

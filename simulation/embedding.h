@@ -9,8 +9,9 @@ namespace supine::simulation {
 /// Points that are carried along by the tissue: organ surfaces, landmarks.
 class Embedding {
  public:
-  /// Finds the cell of each of @p points (#P by 3, mm) in the imaged mesh; a point outside follows the closest
-  /// cell's shape functions, continued.
+  /// Finds the cell of each of @p points (#P by 3, mm) in the imaged mesh; on quadratic cells the curved one, whose map
+  /// is inverted by Newton's method. A point outside follows the closest place of the closest cell, continued from
+  /// there along the cell's tangent map.
   Embedding(const meshing::TetMesh& mesh, const Points& points);
 
   /// Where the points are when the mesh's nodes are at @p positions (#N by 3). Same order as given.

@@ -12,12 +12,15 @@ namespace supine::simulation {
 namespace {
 
 constexpr double sufficient_decrease = 1e-4;  // Armijo constant
+constexpr double natural_decrease = 0.25;     // Deuflhard's restricted monotonicity
 constexpr int max_halvings = 12;
 constexpr double longest_step_mm = 40;  // a Newton step beyond this is shortened before the line search
 constexpr int stall_window = 12;        // iterations in which the residual must fall to stall_share of what it was
 constexpr double stall_share = 0.5;
 constexpr double loosest_residual = 1e-4;  // stiff ties leave rounding behind; more than this is no equilibrium
 constexpr double largest_fall = 0.1;       // det F may fall to this share of its value in one step
+constexpr double crushed_det_f = 1e-3;     // an element that comes here is on its way through zero
+constexpr double crushed_step_factor = 4;  // where elements are crushed, smaller load steps than this only repeat it
 
 using Flat = Eigen::Map<Eigen::VectorXd>;
 
@@ -63,42 +66,62 @@ SolveReport EquilibriumSolver::solve(Unknown unknown, const Points& known, Point
   return report;
 }
 
+EquilibriumSolver::Attempt EquilibriumSolver::attempt_step(Unknown unknown, const Points& known, const Points& ahead,
+                                                           Points& trial, double load) {
+  const Points from = trial;
+  trial = ahead;
+  Attempt attempt = newton(unknown, known, trial, load);
+  if (attempt.converged || attempt.iterations > 0) return attempt;
+  trial = from;  // the straight line led into an inverted element
+  return newton(unknown, known, trial, load);
+}
+
 SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, Points& sought) {
   SolveReport report;
-  double load = 0, step = 1;
-  Points at_load = sought, trial;
-  Attempt last;
+  double load = 0, load_before = 0, step = 1, failed = std::numeric_limits<double>::infinity();
+  Points at_load = sought, before = sought, trial, ahead;
   while (load < 1) {
-    const double target = std::min(1.0, load + step);
+    const double target = std::min({1.0, load + step, failed});
+    ahead = at_load;
+    if (load > 0) ahead += (target - load) / (load - load_before) * (at_load - before);
     trial = at_load;
-    last = newton(unknown, known, trial, target);
+    const Attempt last = attempt_step(unknown, known, ahead, trial, target);
     report.newton_iterations += last.iterations;
     if (last.converged) {
+      load_before = load;
       load = target;
-      at_load = trial;
+      before.swap(at_load);
+      at_load.swap(trial);
+      if (load >= failed) failed = std::numeric_limits<double>::infinity();
       ++report.load_steps;
       report.residual_share = last.residual_share;
       report.min_det_f = last.min_det_f;
       if (last.iterations <= 8) step *= 2;
       continue;
     }
-    step = 0.5 * std::min(step, target - load);
-    if (step >= options_.smallest_load_step) continue;
-    const std::string place = [&] {
-      if (last.min_cell < 0) return std::string();
-      Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
-      for (int a = 0; a < 4; ++a) centre += 0.25 * at_load.row(mechanics_.mesh().cells(last.min_cell, a));
-      return fmt::format("; smallest det F {:.3g} in cell {} at ({:.1f}, {:.1f}, {:.1f}) mm", last.min_det_f,
-                         last.min_cell, centre.x(), centre.y(), centre.z());
-    }();
-    throw NumericalFailure(fmt::format(
-        "{}: no equilibrium found beyond {:.0f} % of gravity ({}{}). A softer tissue than this shape can carry, or a "
-        "poor mesh there: raise breast.young_modulus_kpa or skin.young_modulus_kpa, use law = \"neo_hookean\", or "
-        "look at the mesh with supine-tetrahedralise --check",
-        what_, 100 * load, last.reason, place));
+    failed = target;
+    step = 0.5 * (target - load);
+    if (step < options_.smallest_load_step * (last.crushed ? crushed_step_factor : 1))
+      throw NumericalFailure(failure(last, load, trial));
   }
   sought = at_load;
   return report;
+}
+
+std::string EquilibriumSolver::failure(const Attempt& last, double load, const Points& shape) const {
+  Eigen::RowVector3d at = shape.row(last.worst_node);
+  std::string place = fmt::format("; furthest out of balance at ({:.1f}, {:.1f}, {:.1f}) mm", at.x(), at.y(), at.z());
+  if (last.min_cell >= 0 && last.min_det_f < 0.1) {
+    at.setZero();
+    for (int a = 0; a < 4; ++a) at += 0.25 * shape.row(mechanics_.mesh().cells(last.min_cell, a));
+    place = fmt::format("; smallest det F {:.3g} in cell {} at ({:.1f}, {:.1f}, {:.1f}) mm", last.min_det_f,
+                        last.min_cell, at.x(), at.y(), at.z());
+  }
+  return fmt::format(
+      "{}: no equilibrium found beyond {:.0f} % of gravity ({}{}). A softer tissue than this shape can carry, or a "
+      "poor mesh there: raise breast.young_modulus_kpa or skin.young_modulus_kpa, use law = \"neo_hookean\", or "
+      "look at the mesh with supine-tetrahedralise --check",
+      what_, 100 * load, last.reason, place);
 }
 
 State EquilibriumSolver::state_of(Unknown unknown, const Points& known, const Points& sought, double load) {
@@ -114,6 +137,11 @@ void EquilibriumSolver::evaluate(Unknown unknown, const Points& known, const Poi
 void EquilibriumSolver::note_state(Attempt& attempt) const {
   attempt.min_det_f = sums_.min_det_f;
   attempt.min_cell = sums_.min_cell;
+  if (sums_.valid)
+    Eigen::Map<const Points>(sums_.residual.data(), sums_.residual.size() / 3, 3)
+        .rowwise()
+        .squaredNorm()
+        .maxCoeff(&attempt.worst_node);
   attempt.residual_share = weight_norm_ > 0 ? sums_.residual.norm() / weight_norm_ : 0;
 }
 
@@ -121,6 +149,7 @@ bool EquilibriumSolver::search_line(Unknown unknown, const Points& known, Points
                                     const Eigen::VectorXd& step) {
   const bool use_energy = unknown == Unknown::deformed && mechanics_.has_energy();
   const double norm = sums_.residual.norm(), energy = sums_.energy, slope = sums_.residual.dot(step);
+  const double natural = use_energy ? 0 : direction_.natural_mm(sums_.residual);
   const double least_det_f = largest_fall * std::min(sums_.min_det_f, 1.0);
   const bool last_digits = step.cwiseAbs().maxCoeff() < options_.step_tolerance_mm;
   const Points start = sought;
@@ -134,6 +163,7 @@ bool EquilibriumSolver::search_line(Unknown unknown, const Points& known, Points
     if (use_energy ? sums_.energy <= energy + sufficient_decrease * alpha * slope + rounding
                    : sums_.residual.norm() <= (1 - sufficient_decrease * alpha) * norm)
       return true;
+    if (!use_energy && direction_.natural_mm(sums_.residual) <= (1 - natural_decrease * alpha) * natural) return true;
   }
   sought = start;
   return false;
@@ -156,6 +186,8 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
   for (int iteration = 0;; ++iteration) {
     note_state(attempt);
     if (!sums_.valid) return give_up("an element is inverted");
+    attempt.crushed = sums_.min_det_f < crushed_det_f;
+    if (attempt.crushed && iteration > 0) return give_up("an element is crushed");
     if (options_.progress) options_.progress(what_, load, iteration, attempt.residual_share);
     const double moved = iteration == 0 ? longest_step_mm : step.cwiseAbs().maxCoeff();
     attempt.converged =

@@ -24,15 +24,17 @@ struct SolveReport {
   int load_steps = 0;         ///< completed
   double min_det_f = 1;
   double residual_share = 0;  ///< |r| / |weight| at the end
+  int folded_cells = 0;       ///< filled by Chain: quadratic cells inside out between their quadrature points (folds.h)
 };
 
-/// Finds equilibrium r(x, X) = 0 by Newton's method with exact tangents, line search and adaptive load steps
-/// (the full load is tried first; a step that fails is halved). Symbolic analysis is done once per object.
+/// Finds equilibrium r(x, X) = 0 by Newton's method with exact tangents, line search and adaptive load steps: the full
+/// load is tried first; where that fails, half of the way to the load that failed; from the second step on it starts on
+/// the straight line through the last two shapes. Symbolic analysis is done once per object.
 class EquilibriumSolver {
  public:
   explicit EquilibriumSolver(const Mechanics& mechanics, SolveOptions options = {});
 
-  /// Deformed shape for a known undeformed one. Merit: energy (|r| for a law without energy).
+  /// Deformed shape for a known undeformed one. Merit: energy (for a law without energy that of inverse()).
   /// @param X  undeformed nodes   @param x  out: equilibrium at full load, reached from x = X and no load
   /// @param what  names the solve in messages, for example "supine"
   /// @param start  a shape close to the answer, tried first at full load; or nullptr
@@ -40,7 +42,8 @@ class EquilibriumSolver {
   SolveReport forward(const Points& X, Points& x, const std::string& what, const Points* start = nullptr);
 
   /// Undeformed shape whose equilibrium under the load is the known deformed one (Govindjee and Mihalic 1996;
-  /// Mazier et al. 2022). Unknown X, matrix ∂r/∂X. Merit: |r|.
+  /// Mazier et al. 2022). Unknown X, matrix ∂r/∂X. A step is good when it lowers |r| or the way in mm that the kept
+  /// factor still asks for: |r| alone stalls on slender bodies, where a step that bends rightly stretches a little.
   SolveReport inverse(const Points& x, Points& X, const std::string& what, const Points* start = nullptr);
 
   /// Forgets what earlier solves left behind to save work, so that the next ones give the same bytes as after making.
@@ -52,12 +55,16 @@ class EquilibriumSolver {
     bool converged = false;
     int iterations = 0;
     std::string reason;
+    bool crushed = false;  ///< an element was about to turn inside out
     double min_det_f = 1;
     int min_cell = -1;
+    Eigen::Index worst_node = 0;  ///< furthest out of balance
     double residual_share = 0;
   };
   SolveReport solve(Unknown unknown, const Points& known, Points& sought, const std::string& what, const Points* start);
   SolveReport step_load(Unknown unknown, const Points& known, Points& sought);
+  Attempt attempt_step(Unknown unknown, const Points& known, const Points& ahead, Points& trial, double load);
+  std::string failure(const Attempt& last, double load, const Points& shape) const;
   void note_state(Attempt& attempt) const;
   bool search_line(Unknown unknown, const Points& known, Points& sought, double load, const Eigen::VectorXd& step);
   Attempt newton(Unknown unknown, const Points& known, Points& sought, double load);

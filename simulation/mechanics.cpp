@@ -41,7 +41,7 @@ std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, cons
 }
 
 template <class Element>
-Eigen::VectorXd det_f_of(const Indices& cells, const Points& x, const Points& X) {
+Eigen::VectorXd det_f_of(const Indices& cells, const Points& x, const Points& X, bool corners) {
   Eigen::VectorXd smallest(cells.rows());
   for (int c = 0; c < cells.rows(); ++c) {
     const auto now = gather<Element::nodes>(x, cells, c), rest = gather<Element::nodes>(X, cells, c);
@@ -51,10 +51,11 @@ Eigen::VectorXd det_f_of(const Indices& cells, const Points& x, const Points& X)
       least = std::min(least, point.det > 0 ? (now.transpose() * point.b).determinant() : point.det);
     }
     if constexpr (Element::nodes == 10)
-      for (const auto& gradient : tet10_corner_gradients()) {
-        const double before = (rest.transpose() * gradient).determinant();
-        least = std::min(least, before > 0 ? (now.transpose() * gradient).determinant() / before : before);
-      }
+      if (corners)
+        for (const auto& gradient : tet10_corner_gradients()) {
+          const double before = (rest.transpose() * gradient).determinant();
+          least = std::min(least, before > 0 ? (now.transpose() * gradient).determinant() / before : before);
+        }
     smallest[c] = least;
   }
   return smallest;
@@ -118,7 +119,11 @@ void Mechanics::hold(const Demand& demand, Sums& sums) const {
 }
 
 Eigen::VectorXd cell_det_f(const Indices& cells, const Points& x, const Points& X) {
-  return cells.cols() == 10 ? det_f_of<Tet10>(cells, x, X) : det_f_of<Tet4>(cells, x, X);
+  return cells.cols() == 10 ? det_f_of<Tet10>(cells, x, X, true) : det_f_of<Tet4>(cells, x, X, true);
+}
+
+Eigen::VectorXd cell_det_f_at_points(const Indices& cells, const Points& x, const Points& X) {
+  return cells.cols() == 10 ? det_f_of<Tet10>(cells, x, X, false) : det_f_of<Tet4>(cells, x, X, false);
 }
 
 }  // namespace supine::simulation

@@ -50,4 +50,7 @@ class Mechanics {
 /// or x is inverted.
 Eigen::VectorXd cell_det_f(const Indices& cells, const Points& x, const Points& X);
 
+/// The same over the quadrature points alone: what the energy sees.
+Eigen::VectorXd cell_det_f_at_points(const Indices& cells, const Points& x, const Points& X);
+
 }  // namespace supine::simulation

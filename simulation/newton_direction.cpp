@@ -2,6 +2,7 @@
 #include "simulation/newton_direction.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace supine::simulation {
 namespace {
@@ -46,6 +47,12 @@ bool NewtonDirection::undeformed(const State& state, double tolerance, Sums& sum
     outworn_ = true;
   }
   return false;
+}
+
+double NewtonDirection::natural_mm(const Eigen::VectorXd& residual) {
+  if (!have_factor_) return std::numeric_limits<double>::quiet_NaN();
+  factor_->solve(residual, natural_);
+  return natural_.norm();
 }
 
 /// @param step  the Newton step with the new factor, or nullptr when only the factor is wanted

@@ -29,6 +29,11 @@ class NewtonDirection {
   /// Step for the undeformed shape. @p sums holds residual and reference tangent at @p state.
   bool undeformed(const State& state, double tolerance, Sums& sums, Eigen::VectorXd& step);
 
+  /// How far the kept factor would move the nodes to take @p residual away, mm: root of the sum of squares. The measure
+  /// of progress that does not depend on how stiff a body is in which direction (Deuflhard, Newton Methods for
+  /// Nonlinear Problems, 2004, section 3.3); not a number without a factor.
+  double natural_mm(const Eigen::VectorXd& residual);
+
   /// Forgets the kept factor, so that what follows does not depend on what was solved before.
   void forget() { have_factor_ = false; }
 
@@ -44,6 +49,7 @@ class NewtonDirection {
   const Mechanics& mechanics_;
   std::unique_ptr<SpdSolver> factor_;
   Krylov krylov_;
+  Eigen::VectorXd natural_;  // work space
   bool have_factor_ = false;
   bool outworn_ = false;  // the last Krylov solve cost more than a new factor would
   bool exact_ = true;

@@ -91,11 +91,12 @@ class CalibrateTool : public Tool {
 
   Outcome run(Run& run) override {
     run.stage("read");
+    claim_targets(run);
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
-    check_targets();
     simulation::Model model = measured_->model;
     if (scan_offset_) add_scan_offset(model);
     const FreeParameters parameters(model);
+    if (map_ > 0 && parameters.size() < 2) throw InputError("--map needs two free parameters, the model has one");
     Evaluator evaluator(measured_->fitted_scene(), model);
     const CalibrationResult result = calibrate(run, evaluator, parameters);
     if (map_ > 0) {
@@ -111,13 +112,18 @@ class CalibrateTool : public Tool {
  private:
   fs::path folder() const { return output.empty() ? mesh_file_.parent_path() : output; }
 
-  void check_targets() const {
+  /// Before the work, so that nobody waits for an answer that cannot be written.
+  void claim_targets(Run& run) const {
+    const fs::path start = model_file_.empty() ? case_folder_ / "model.toml" : model_file_;
     std::error_code none;
-    if (fs::equivalent(folder() / "model.toml", measured_->model_file, none))
+    if (fs::equivalent(folder() / "model.toml", start, none))
       throw InputError(
           fmt::format("the fitted model would replace {}, which is the model to start from; name another "
                       "folder with -o",
-                      measured_->model_file.string()));
+                      start.string()));
+    for (const char* name : {"model.toml", "history.csv", "calibration.json"}) run.output(folder() / name);
+    if (map_ > 0)
+      for (const char* name : {"error_map.csv", "error_map.vti"}) run.output(folder() / name);
   }
 
   calibration::FitOptions fit_options(Run& run, Evaluator& evaluator, LiveProgress& live) const {
@@ -191,7 +197,6 @@ class CalibrateTool : public Tool {
 
   void write_map(Run& run, const FreeParameters& parameters, const CalibrationResult& result) const {
     constexpr double reach = 1.4;  // a factor of four either way
-    if (parameters.size() < 2) throw InputError("--map needs two free parameters, the model has one");
     calibration::RunJournal journal(folder() / "error_map.runs", journal_key(*measured_, case_folder_, mesh_file_));
     calibration::EvaluatorPool pool(measured_->fitted_scene(), parameters, measured_->start, run.threads());
     LiveProgress live(run);
@@ -222,7 +227,10 @@ class CalibrateTool : public Tool {
                              scene.measurements.begin() + static_cast<std::ptrdiff_t>(measured_->fitted.size()));
     const simulation::Model model = parameters.model(result.fit.u);
     Evaluator other(scene, model);
-    calibration::Prediction prediction = other.predict(model);
+    simulation::ChainSolution near = result.fit.prediction.solution;
+    near.poses.assign(measured_->start.poses.begin() + static_cast<std::ptrdiff_t>(measured_->fitted.size()),
+                      measured_->start.poses.end());
+    const calibration::Prediction prediction = other.predict(model, &near);
     for (std::size_t m = 0; m < scene.measurements.size(); ++m) {
       calibration::Prediction one;
       one.poses.push_back(prediction.poses[m]);

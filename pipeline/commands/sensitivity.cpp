@@ -51,6 +51,7 @@ class SensitivityTool : public Tool {
   Outcome run(Run& run) override {
     run.stage("read");
     const fs::path target = target_file();
+    run.output(target);  // before the work, so that nobody waits for what cannot be written
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
     const FreeParameters parameters(measured_->model);
     const DrawKind kind = law_ == "normal" ? DrawKind::normal : DrawKind::prior;

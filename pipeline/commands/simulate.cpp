@@ -10,6 +10,7 @@
 #include "pipeline/model_file.h"
 #include "pipeline/tool.h"
 #include "reconstruction/surface_io.h"
+#include "simulation/bulk.h"
 #include "simulation/chain.h"
 #include "simulation/embedding.h"
 #include "simulation/linear_solver.h"
@@ -29,6 +30,9 @@ const std::map<std::string, InverseMethod> inverse_methods = {{"newton", Inverse
 
 // A round trip beyond this is not a certificate; the true inverse ends orders below.
 constexpr double round_trip_bound_mm = 1e-6;
+
+// Two balanced shapes closer than this are one for whoever reads the prediction.
+constexpr double second_shape_bound_mm = 0.01;
 
 // Prone landmarks are marked on the imaged body: a little noise is to be expected, no more.
 constexpr double landmark_warning_mm = 2, landmark_bound_mm = 10;
@@ -82,6 +86,7 @@ class SimulateTool : public Tool {
   Outcome run(Run& run) override {
     run.stage("read");
     const Inputs in = read(run);
+    warn_of_locking(run, in);
     run.stage("solve");
     simulation::SolveOptions options;
     options.progress = [&run](const std::string& what, double load, int iteration, double share) {
@@ -93,6 +98,20 @@ class SimulateTool : public Tool {
     run.stage("write");
     write(run, in, solution);
     say(run, in, solution);
+    for (const std::string& warning : solution.warnings) run.warn(warning);
+    return judge(run, solution);
+  }
+
+ private:
+  void warn_of_locking(Run& run, const Inputs& in) const {
+    const auto poisson = Eigen::VectorXd::Constant(in.mesh.cells.rows(), in.model.breast.poisson_ratio.value);
+    const std::string warning = simulation::locking_warning(in.mesh.order(), poisson, in.model.breast.volumetric);
+    if (!warning.empty()) run.warn(warning);
+  }
+
+  Outcome judge(Run& run, const ChainSolution& solution) const {
+    for (const PoseSolution& pose : solution.poses)
+      if (pose.second_shape_mm > second_shape_bound_mm) return Outcome::target_not_met;
     if (solution.round_trip_max_mm <= round_trip_bound_mm) return Outcome::done;
     if (inverse_ != "newton") {
       run.warn(
@@ -108,7 +127,6 @@ class SimulateTool : public Tool {
     return Outcome::target_not_met;
   }
 
- private:
   Inputs read(Run& run) const {
     run.input(case_folder_ / "case.toml");
     Inputs in{read_case(case_folder_), {}, {}, {}, {}};
@@ -191,6 +209,7 @@ class SimulateTool : public Tool {
     for (const PoseSolution& pose : solution.poses) {
       const fs::path file = write_shape(pose.name, pose.x, {});
       run.figures(file) = figures(in, solution, pose.report, pose.x);
+      run.figures(file)["second_shape_mm"] = pose.second_shape_mm;
     }
   }
 
@@ -206,6 +225,7 @@ class SimulateTool : public Tool {
     f["factorisations"] = report.factorisations;
     f["load_steps"] = report.load_steps;
     f["min_det_f"] = report.min_det_f;
+    f["folded_cells"] = report.folded_cells;
     f["residual_share"] = report.residual_share;
     f["displacement_from_prone_mm"] = {{"rms", rms(from_prone)}, {"max", from_prone.maxCoeff()}};
     f["displacement_from_undeformed_mm"] = {{"rms", rms(from_undeformed)}, {"max", from_undeformed.maxCoeff()}};

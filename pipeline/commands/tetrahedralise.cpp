@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "common/error.h"
 #include "meshing/anatomy.h"
@@ -34,6 +35,7 @@ constexpr double good_cells_share = 0.25;  // how far --cells may be missed
 
 /// Everything a run finds out besides the mesh itself.
 struct Findings {
+  int order = 1;
   std::string side;
   QualityReport quality;
   std::optional<meshing::CurveReport> curve;
@@ -42,6 +44,13 @@ struct Findings {
 };
 
 Json numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+std::string place(const Eigen::Vector3d& p) { return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", p.x(), p.y(), p.z()); }
+
+std::string histogram(std::string line, std::span<const Eigen::Index> counts) {
+  for (const Eigen::Index count : counts) line += fmt::format(" {}", count);
+  return line;
+}
 
 class TetrahedraliseTool : public Tool {
  public:
@@ -55,7 +64,10 @@ class TetrahedraliseTool : public Tool {
            "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --side left\n"
            "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --order 2 --fine breast.vtp\n"
            "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --cells 20000 --order 2 -o fine.vtu\n"
-           "  supine-tetrahedralise --check mesh.vtu\n";
+           "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --interface gland=gland_coarse.vtp\n"
+           "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --error-from supine.vtu --cells 20000 -o "
+           "fine.vtu\n"
+           "  supine-tetrahedralise --check mesh.vtu -o report.json\n";
   }
 
   void declare(CLI::App& app) override {
@@ -83,19 +95,32 @@ class TetrahedraliseTool : public Tool {
     app.add_option("--radius-edge", options_.radius_edge, "circumradius over shortest edge aimed at, 1.2 to 3");
     app.add_option("--min-dihedral", options_.min_dihedral_deg, "smallest dihedral angle aimed at, degrees, 0 to 18");
     app.add_option("--side", side_, "which breast it is, left, right or both; default: what the labels say, or left");
-    app.add_flag("--check", check_, "print the report, write nothing; exit code 1 when the mesh is not good");
+    app.add_option(
+        "--interface", interfaces_,
+        "TISSUE=FILE: a closed surface inside (.vtp .ply .stl .obj) that no tetrahedron crosses, the border of "
+        "that tissue; may be repeated, what lies inside another comes after it");
+    app.add_option("--error-from", error_from_,
+                   "a pose computed on another mesh of this case (.vtu): tetrahedra and surface become finer where its "
+                   "displacement gradient jumps, --cells of them (default: as many as that mesh has)");
+    app.add_flag("--check", check_,
+                 "print the report, write no mesh (-o X.json: the report); exit code 1 when the mesh is not good");
   }
 
   Outcome run(Run& run) override {
     Findings findings;
     if (check_ && fs::path(surface_).extension() == ".vtu") {
-      findings.quality = meshing::measure_quality(meshing::read_mesh(run.input(surface_)));
+      const TetMesh mesh = meshing::read_mesh(run.input(surface_));
+      findings.order = mesh.order();
+      findings.quality = meshing::measure_quality(mesh);
       say(run, findings);
+      if (!output.empty()) write_report(run, findings);
       return judge(run, findings.quality);
     }
     const TetMesh mesh = make_mesh(run, findings);
     say(run, findings);
+    findings.order = order_;
     if (!check_) write(run, mesh, findings);
+    if (check_ && !output.empty()) write_report(run, findings);
     return judge(run, findings.quality);
   }
 
@@ -113,14 +138,21 @@ class TetrahedraliseTool : public Tool {
     run.progress("filling the surface with tetrahedra");
     meshing::TetrahedraliseOptions options = options_;
     options.edge_mm = meshing::mean_edge_mm(surface);
+    meshing::Inside inside{read_interfaces(run), nullptr};
+    const std::optional<meshing::SizeField> sizes = read_sizes(run, options);
+    if (sizes) {
+      surface = meshing::refine_to_sizes(surface, *sizes);
+      inside.sizes = &*sizes;
+    }
     if (skin_edge_mm_ != 0) surface = meshing::refine_skin_edge(surface, skin_edge_mm_);
-    TetMesh mesh = meshing::tetrahedralise(surface, options, surface_);
+    auto [mesh, enclosing] = meshing::tetrahedralise(surface, inside, options, surface_);
     mesh.muscle = muscle;
     if (order_ == 2) mesh = meshing::to_quadratic(mesh);
     bend(run, mesh, findings);
     run.stage("tissue");
     run.progress("reading tissue fractions from the labels");
     findings.fractions = meshing::assign_tissue(mesh, labels);
+    if (!inside.interfaces.empty()) meshing::impose_interfaces(mesh, enclosing, inside.interfaces);
     run.stage("anatomy");
     run.progress("finding the foot of the mound");
     mark_ring(run, mesh, findings);
@@ -128,6 +160,27 @@ class TetrahedraliseTool : public Tool {
     meshing::check_mesh(mesh);
     findings.quality = meshing::measure_quality(mesh);
     return mesh;
+  }
+
+  std::vector<meshing::Interface> read_interfaces(Run& run) const {
+    std::vector<meshing::Interface> interfaces;
+    for (const std::string& text : interfaces_) {
+      const std::size_t equals = text.find('=');
+      const auto tissue = segmentation::tissue_from_name(text.substr(0, equals));
+      if (equals == std::string::npos || !tissue)
+        throw InputError(
+            fmt::format("--interface {}: TISSUE=FILE is expected, for example gland=gland_coarse.vtp", text));
+      const std::string file = text.substr(equals + 1);
+      interfaces.push_back({reconstruction::read_surface(run.input(file)), *tissue, file});
+    }
+    return interfaces;
+  }
+
+  std::optional<meshing::SizeField> read_sizes(Run& run, meshing::TetrahedraliseOptions& options) const {
+    if (error_from_.empty()) return std::nullopt;
+    const meshing::PoseMesh pose = meshing::read_pose(run.input(error_from_));
+    if (options.cells == 0) options.cells = static_cast<std::size_t>(pose.mesh.cells.rows());
+    return meshing::sizes_from_pose(pose, options.cells);
   }
 
   void bend(Run& run, TetMesh& mesh, Findings& findings) const {
@@ -184,14 +237,20 @@ class TetrahedraliseTool : public Tool {
     run.say(target.string());
   }
 
+  void write_report(Run& run, const Findings& findings) const {
+    if (output.extension() != ".json")
+      throw InputError(
+          fmt::format("-o {}: with --check the report is written, its file ends in .json", output.string()));
+    fill(run.figures(output), findings);
+  }
+
   Outcome judge(Run& run, const QualityReport& q) const {
     Outcome outcome = Outcome::done;
     if (q.inverted > 0 || q.min_dihedral_deg < good_dihedral_deg) {
       run.warn(fmt::format(
           "{} inverted tetrahedra, smallest dihedral angle {:.2f} degrees (at least {} is good); the worst is at "
-          "({:.1f}, {:.1f}, {:.1f}) mm: smooth or decimate the surface differently there",
-          q.inverted, q.min_dihedral_deg, good_dihedral_deg, q.worst_place_mm.x(), q.worst_place_mm.y(),
-          q.worst_place_mm.z()));
+          "{}: smooth or decimate the surface differently there",
+          q.inverted, q.min_dihedral_deg, good_dihedral_deg, place(q.smallest_angle_place_mm)));
       outcome = Outcome::target_not_met;
     }
     const double wanted = static_cast<double>(options_.cells);
@@ -246,7 +305,7 @@ class TetrahedraliseTool : public Tool {
 
   void fill(Json& json, const Findings& findings) const {
     const QualityReport& q = findings.quality;
-    json["order"] = order_;
+    json["order"] = findings.order;
     json["nodes"] = q.nodes;
     json["cells"] = q.cells;
     json["triangles"] = q.faces;
@@ -259,19 +318,25 @@ class TetrahedraliseTool : public Tool {
     for (int t = 0; t < segmentation::tissue_count; ++t) {
       if (!segmentation::is_meshed(static_cast<segmentation::Tissue>(t))) continue;
       json["volumes_ml"]["mesh"][std::string(tissue_names[t])] = q.tissue_ml[t];
-      json["volumes_ml"]["voxels"][std::string(tissue_names[t])] = findings.fractions->voxel_ml[t];
+      if (findings.fractions)
+        json["volumes_ml"]["voxels"][std::string(tissue_names[t])] = findings.fractions->voxel_ml[t];
     }
-    json["outside_labels_share"] = findings.fractions->outside_share;
+    if (findings.fractions) json["outside_labels_share"] = findings.fractions->outside_share;
     json["inverted"] = q.inverted;
     json["min_dihedral_deg"] = q.min_dihedral_deg;
     json["max_dihedral_deg"] = q.max_dihedral_deg;
     json["smallest_dihedral_histogram_10deg"] = q.smallest_dihedral;
     json["largest_dihedral_histogram_10deg"] = q.largest_dihedral;
+    json["smallest_dihedral_cell"] = q.smallest_angle_cell;
+    json["smallest_dihedral_place_mm"] = numbers(q.smallest_angle_place_mm);
+    json["radius_ratio_histogram_tenths"] = q.radius_ratio;
     json["min_radius_ratio"] = q.min_radius_ratio;
     json["mean_radius_ratio"] = q.mean_radius_ratio;
     json["worst_cell"] = q.worst_cell;
     json["worst_place_mm"] = numbers(q.worst_place_mm);
-    if (order_ == 2) {
+    if (findings.order == 2) {
+      json["worst_jacobian_cell"] = q.worst_jacobian_cell;
+      json["worst_jacobian_place_mm"] = numbers(q.worst_jacobian_place_mm);
       json["min_scaled_jacobian"] = q.min_scaled_jacobian;
       json["mean_scaled_jacobian"] = q.mean_scaled_jacobian;
       json["scaled_jacobian_histogram_tenths"] = q.scaled_jacobian;
@@ -304,15 +369,19 @@ class TetrahedraliseTool : public Tool {
                         q.volume_ml));
     run.say(fmt::format("dihedral angles {:.1f} to {:.1f} degrees, radius ratio min {:.3f} mean {:.3f}, {} inverted",
                         q.min_dihedral_deg, q.max_dihedral_deg, q.min_radius_ratio, q.mean_radius_ratio, q.inverted));
-    run.say(fmt::format("worst tetrahedron {} at ({:.1f}, {:.1f}, {:.1f}) mm", q.worst_cell, q.worst_place_mm.x(),
-                        q.worst_place_mm.y(), q.worst_place_mm.z()));
+    run.say(fmt::format("smallest angle: tetrahedron {} at {}; smallest radius ratio: tetrahedron {} at {}",
+                        q.smallest_angle_cell, place(q.smallest_angle_place_mm), q.worst_cell,
+                        place(q.worst_place_mm)));
     if (q.worst_jacobian_cell >= 0)
-      run.say(fmt::format("scaled Jacobian of the quadratic tetrahedra: min {:.3f} (tetrahedron {}), mean {:.3f}",
-                          q.min_scaled_jacobian, q.worst_jacobian_cell, q.mean_scaled_jacobian));
+      run.say(fmt::format("scaled Jacobian of the quadratic tetrahedra: min {:.3f} (tetrahedron {} at {}), mean {:.3f}",
+                          q.min_scaled_jacobian, q.worst_jacobian_cell, place(q.worst_jacobian_place_mm),
+                          q.mean_scaled_jacobian));
     if (findings.curve) say_curve(run, *findings.curve);
-    std::string histogram = "smallest angle per tetrahedron, 0-10-20-... degrees:";
-    for (int i = 0; i < 8; ++i) histogram += fmt::format(" {}", q.smallest_dihedral[i]);
-    run.say(histogram);
+    run.say(
+        histogram("smallest angle per tetrahedron, 0-10-20-...-80 degrees:", std::span(q.smallest_dihedral).first(8)));
+    run.say(histogram("largest angle per tetrahedron, 60-70-...-180 degrees:", std::span(q.largest_dihedral).last(12)));
+    run.say(histogram("radius ratio, 0-0.1-...-1:", q.radius_ratio));
+    if (findings.order == 2) run.say(histogram("scaled Jacobian, 0-0.1-...-1:", q.scaled_jacobian));
     for (std::size_t r = 1; r < reconstruction::region_names.size(); ++r) {
       run.say(fmt::format("{:<10}{:>8} triangles{:>10.1f} cm2", reconstruction::region_names[r], q.region_faces[r],
                           q.area_cm2[r]));
@@ -329,7 +398,8 @@ class TetrahedraliseTool : public Tool {
                         a.foot_radius_mm, a.rim_thickness_mm, a.mound_height_mm));
   }
 
-  std::string surface_, muscle_, labels_, side_, fine_;
+  std::string surface_, muscle_, labels_, side_, fine_, error_from_;
+  std::vector<std::string> interfaces_;
   meshing::TetrahedraliseOptions options_;
   meshing::CurveOptions curving_;
   double skin_edge_mm_ = 0;

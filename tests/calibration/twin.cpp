@@ -42,7 +42,8 @@ reconstruction::Surface scan_of(const calibration::ModelSkin& skin, const Twin::
 
 Twin::Twin(const Options& options) {
   mesh = moved(dome_scene().mesh, options.frame.rotation(), options.frame.translation());
-  anatomy = meshing::compute_anatomy(mesh, "left");
+  const bool stays = options.frame.matrix() == Eigen::Matrix4d::Identity();
+  anatomy = stays ? dome_scene().anatomy : meshing::compute_anatomy(mesh, "left");
   prone = {"prone", options.frame.rotation() * Eigen::Vector3d(0, -1, 0)};
   supine = {"supine", options.frame.rotation() * Eigen::Vector3d(0.2, 0.9, 0.1).normalized()};
   simulation::Chain chain(mesh, anatomy, options.truth, {prone, supine});

@@ -5,34 +5,17 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <random>
 
 #include "common/error.h"
-#include "diagnosis/diagnose.h"
+#include "diagnosis/chi_squared.h"
+#include "tests/diagnosis/sheet.h"
 
 namespace supine::diagnosis {
 namespace {
 
 using calibration::Residuals;
 
-/// Points on a sheet, white noise of 0.5 mm.
-Residuals sheet(unsigned seed, int count = 600) {
-  std::mt19937 generator(seed);
-  std::uniform_real_distribution<double> uniform(-60, 60);
-  std::normal_distribution<double> normal(0, 0.5);
-  Residuals r;
-  r.place.resize(count, 3);
-  r.distance_mm.resize(count);
-  for (int i = 0; i < count; ++i) {
-    r.place.row(i) << uniform(generator), uniform(generator), 0;
-    r.distance_mm[i] = normal(generator);
-  }
-  r.q = r.place.leftCols<2>() / 60;
-  r.sigma_mm = Eigen::VectorXd::Constant(count, 0.5);
-  r.pose = Eigen::VectorXi::Zero(count);
-  r.point = Eigen::VectorXi::LinSpaced(count, 0, count - 1);
-  return r;
-}
+using supine::testing::sheet;
 
 Eigen::MatrixXd fitted_slopes(const Residuals& r) {
   Eigen::MatrixXd slope(r.size(), 2);
@@ -149,6 +132,13 @@ TEST(ScoreTest, PowerIsThatOfTheNoncentralChiSquared) {
   EXPECT_NEAR(chi_squared_power(6, 13.624), 0.8, 0.01);
 }
 
+TEST(ScoreTest, ChiSquaredTailsAreThoseOfTheTables) {
+  EXPECT_NEAR(chi_squared_above(1, 3.841), 0.05, 0.005);
+  EXPECT_NEAR(chi_squared_above(10, 18.307), 0.05, 0.005);
+  EXPECT_NEAR(chi_squared_above(28, 48.278), 0.01, 0.002);
+  EXPECT_EQ(chi_squared_above(5, 0), 1);
+}
+
 TEST(Whitening, CorrelatedErrorsBecomeIndependent) {
   const Residuals r = sheet(6, 300);
   const calibration::ErrorModel errors{0.4, 0.9, 25};
@@ -167,60 +157,6 @@ TEST(Whitening, CorrelatedErrorsBecomeIndependent) {
   for (int i = 0; i < 300; ++i) by_point.row(i) = sigma.row(clusters.of_point[i]);
   const Eigen::MatrixXd half = whitening.apply(by_point);  // L⁻¹ Σ = Lᵀ
   EXPECT_LT((half.transpose() * half - sigma).norm(), 1e-9 * sigma.norm());
-}
-
-Score named(const std::string& effect, double bic, double p, double held_out) {
-  Score score{};
-  score.effect = effect, score.bic = bic, score.p_value = p, score.predicted_held_out_rms_mm = held_out;
-  return score;
-}
-
-TEST(Decide, NamesTheOneThatStandsOut) {
-  const ScoreTable table{{named("ligament", 60, 0.001, 0.8), named("adhesion", 20, 0.001, 0.95)}, 1.3, 1.4, 100};
-  const FirstDiagnosis result = decide(table, table, {}, 0.7);
-  EXPECT_EQ(result.verdict, Verdict::missing);
-  EXPECT_EQ(result.missing, std::vector<std::string>{"ligament"});
-}
-
-TEST(Decide, NamesAllThatDoAsWellMeasurementFirst) {
-  const ScoreTable table{{named("adhesion", 60, 0.001, 0.8), named("misregistration", 57, 0.001, 0.8)}, 1.3, 1.4, 100};
-  const FirstDiagnosis result = decide(table, table, {}, 0.7);
-  EXPECT_EQ(result.verdict, Verdict::ambiguous);
-  EXPECT_EQ(result.missing, (std::vector<std::string>{"misregistration", "adhesion"}));
-}
-
-TEST(Decide, DoesNotNameWhatTheHeldOutErrorDoesNotConfirm) {
-  const ScoreTable table{{named("ligament", 60, 0.001, 1.38)}, 1.3, 1.4, 100};
-  EXPECT_EQ(decide(table, table, {}, 0.7).verdict, Verdict::unexplained);
-  const ScoreTable floor{{named("ligament", 60, 0.001, 0.72)}, 0.7, 0.72, 100};
-  EXPECT_EQ(decide(floor, floor, {}, 0.7).verdict, Verdict::nothing_missing);
-}
-
-TEST(Decide, NamesNothingByChance) {
-  const ScoreTable table{{named("ligament", 3, 0.2, 0.8)}, 1.3, 1.4, 100};
-  EXPECT_EQ(decide(table, table, {}, 0.7).verdict, Verdict::nothing_missing);
-}
-
-Refit refit(const std::string& effect, double held_out) {
-  Refit r;
-  r.effect = effect, r.solved = true, r.held_out_rms_mm = r.rms_mm = held_out;
-  return r;
-}
-
-TEST(Decide, RefitsOverruleLinearPredictions) {
-  const ScoreTable table{{named("adhesion", 60, 0.001, 0.8), named("ligament", 30, 0.001, 1.38)}, 1.3, 1.4, 100};
-  const FirstDiagnosis result = decide(table, table, {}, {refit("adhesion", 1.1), refit("ligament", 0.8)}, 0.7);
-  EXPECT_EQ(result.verdict, Verdict::missing);
-  EXPECT_EQ(result.missing, std::vector<std::string>{"ligament"});
-  const FirstDiagnosis both = decide(table, table, {}, {refit("adhesion", 0.81), refit("ligament", 0.8)}, 0.7);
-  EXPECT_EQ(both.verdict, Verdict::ambiguous);
-  EXPECT_EQ(decide(table, table, {}, {refit("adhesion", 1.39)}, 0.7).verdict, Verdict::unexplained);
-}
-
-TEST(Decide, RefitsTheFirstOfEitherTable) {
-  const ScoreTable a{{named("adhesion", 60, 0, 0), named("ligament", 30, 0, 0), named("creep", 3, 0, 0)}, 1, 1, 1};
-  const ScoreTable b{{named("friction", 60, 0, 0), named("ligament", 30, 0, 0), named("creep", 3, 0, 0)}, 1, 1, 1};
-  EXPECT_EQ(worth_refitting(a, b, 2), (std::vector<std::string>{"adhesion", "ligament", "friction"}));
 }
 
 }  // namespace

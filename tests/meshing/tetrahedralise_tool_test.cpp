@@ -86,9 +86,28 @@ TEST_F(TetrahedraliseTool, OptionsWork) {
 TEST_F(TetrahedraliseTool, CheckReportsAndWritesNothing) {
   EXPECT_EQ(run("coarse.vtp muscle.vtp labels.vti --check"), 0) << text("err.txt");
   EXPECT_FALSE(fs::exists(folder_ / "mesh.vtu"));
-  EXPECT_NE(text("out.txt").find("worst tetrahedron"), std::string::npos);
+  EXPECT_NE(text("out.txt").find("smallest angle: tetrahedron"), std::string::npos);
   ASSERT_EQ(run("coarse.vtp muscle.vtp labels.vti"), 0);
-  EXPECT_EQ(run("--check mesh.vtu"), 0) << text("err.txt");
+  EXPECT_EQ(run("--check mesh.vtu -o report.json"), 0) << text("err.txt");
+  const auto mesh = nlohmann::json::parse(text("mesh.json")), report = nlohmann::json::parse(text("report.json"));
+  for (const char* key : {"cells", "smallest_dihedral_histogram_10deg", "radius_ratio_histogram_tenths"})
+    EXPECT_EQ(report[key], mesh[key]) << key;
+  ASSERT_EQ(report["worst_place_mm"].size(), 3u);
+  EXPECT_EQ(run("--check mesh.vtu -o report.vtu"), 2);
+}
+
+TEST_F(TetrahedraliseTool, InterfaceBecomesPureTissue) {
+  auto gland = testing::boundary_surface(testing::box_mesh(2, 2, 2, {12, 12, 12}));
+  gland.points.rowwise() += Eigen::RowVector3d(-6, -34, -6);
+  reconstruction::write_surface(gland, folder_ / "gland.vtp");
+  ASSERT_EQ(run("coarse.vtp muscle.vtp labels.vti --interface gland=gland.vtp"), 0) << text("err.txt");
+  EXPECT_NEAR(nlohmann::json::parse(text("mesh.json"))["volumes_ml"]["mesh"]["gland"], 1.728, 1e-6);
+  EXPECT_EQ(run("coarse.vtp muscle.vtp labels.vti --force --interface gland.vtp"), 2);
+  EXPECT_NE(text("err.txt").find("TISSUE=FILE"), std::string::npos) << text("err.txt");
+  gland.points.rowwise() += Eigen::RowVector3d(0, -30, 0);
+  reconstruction::write_surface(gland, folder_ / "gland.vtp");
+  EXPECT_EQ(run("coarse.vtp muscle.vtp labels.vti --force --interface gland=gland.vtp"), 2);
+  EXPECT_NE(text("err.txt").find("gland.vtp"), std::string::npos) << text("err.txt");
 }
 
 TEST_F(TetrahedraliseTool, TooFewCellsIsTargetNotMet) {

@@ -114,6 +114,24 @@ TEST_F(Calibrate, RefusesWhatItCannotDo) {
   EXPECT_FALSE(fs::exists(folder() / "fit"));
 }
 
+TEST_F(Calibrate, SaysThatAnOutputExistsBeforeTheWork) {
+  fs::remove(folder() / "out/mesh.vtu");  // nothing can be computed: what is said comes before
+  for (const char* name : {"fit/model.toml", "fit/history.csv", "fit/calibration.json", "fit/error_map.csv"}) {
+    fs::create_directories(folder() / "fit");
+    write_text(folder() / name, "somebody's\n");
+    const Finished finished = run("calibrate", "fit", {"--map", "2"});
+    EXPECT_EQ(finished.code, 2);
+    EXPECT_NE(finished.err.find(fs::path(name).filename().string() + " exists"), std::string::npos) << finished.err;
+    EXPECT_EQ(bytes(name), "somebody's\n");
+    EXPECT_EQ(files_in(folder() / "fit").size(), 1u);
+    fs::remove_all(folder() / "fit");
+  }
+  write_text(folder() / "s.json", "somebody's\n");
+  const Finished finished = run("sensitivity", "s.csv");
+  EXPECT_EQ(finished.code, 2);
+  EXPECT_NE(finished.err.find("s.json exists"), std::string::npos) << finished.err;
+}
+
 TEST_F(Calibrate, SensitivityGoesThroughItsDraws) {
   const Finished finished = run("sensitivity", "s", {"--samples", "5", "--law", "normal", "--seed", "3"});
   ASSERT_EQ(finished.code, 0) << finished.err;

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/error_sources.h"
+
+#include <algorithm>
+
+#include "calibration/noise.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::Residuals;
+
+/// The scanner's noise as the case says, or as neighbouring points show it where that is more: noise across the normal
+/// comes on top where the skin is steep.
+Eigen::VectorXd noise_of(const Residuals& residuals) {
+  constexpr int fewest = 200;
+  Eigen::VectorXd noise = residuals.sigma_mm;
+  for (int pose = 0; pose <= residuals.pose.maxCoeff(); ++pose) {
+    std::vector<int> rows;
+    for (Eigen::Index r = 0; r < residuals.size(); ++r)
+      if (residuals.pose[r] == pose) rows.push_back(static_cast<int>(r));
+    if (rows.size() < fewest) continue;
+    const double seen = calibration::estimate_noise_mm(residuals.place(rows, Eigen::all), residuals.distance_mm(rows));
+    for (const int r : rows) noise[r] = std::max(noise[r], seen);
+  }
+  return noise;
+}
+
+double tolerance_of(const CandidateParameter& parameter, const std::string& effect, const Tolerances& t) {
+  if (effect == "misregistration") return parameter.unit == "rad" ? t.registration_rad : t.registration_mm;
+  if (effect == "segmentation_offset") return t.segmentation_mm;
+  return t.incompressibility;
+}
+
+std::string source_of(const std::string& effect) {
+  if (effect == "misregistration") return "registration";
+  if (effect == "segmentation_offset") return "segmentation";
+  if (effect == "incompressibility") return "numerical";
+  return {};
+}
+
+}  // namespace
+
+ErrorSources error_sources(const Residuals& residuals, const std::vector<Candidate>& candidates,
+                           const NumericalError* numerical, const calibration::ErrorModel& fallback,
+                           const Tolerances& tolerances) {
+  ErrorSources sources;
+  sources.noise_mm = noise_of(residuals);
+  sources.mean_mm = Eigen::VectorXd::Zero(residuals.size());
+  sources.spread_mm = numerical != nullptr ? numerical->spread_mm : fallback.spread_mm;
+  sources.length_mm = numerical != nullptr ? numerical->length_mm : fallback.length_mm;
+  for (const Candidate& candidate : candidates) {
+    const std::string source = source_of(candidate.effect);
+    for (std::size_t k = 0; !source.empty() && k < candidate.parameters.size(); ++k)
+      sources.modes.push_back({source, tolerance_of(candidate.parameters[k], candidate.effect, tolerances) *
+                                           candidate.slope.col(static_cast<Eigen::Index>(k))});
+  }
+  if (numerical == nullptr) return sources;
+  sources.mean_mm = tolerances.correction * numerical->finer_mm;
+  sources.modes.push_back({"numerical", numerical->finer_mm});
+  return sources;
+}
+
+}  // namespace supine::diagnosis

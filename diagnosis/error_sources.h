@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "calibration/error_model.h"
+#include "diagnosis/candidates.h"
+#include "diagnosis/numerical_error.h"
+
+namespace supine::diagnosis {
+
+/// How well things are known that no tissue effect should be blamed for.
+struct Tolerances {
+  double registration_mm = 0.3;      ///< shift of the scan, 1 sigma in each direction
+  double registration_rad = 0.0036;  ///< turn of the scan: 0.3 mm at 80 mm
+  double segmentation_mm = 0.2;      ///< offset of the imaged skin: about an eighth of a 1.5 mm voxel
+  double incompressibility = 0.25;   ///< of the catalogue's a: linear tetrahedra lock, and ν itself is assumed
+  double correction = 1;             ///< of the finer mesh's change is added to the distances, give or take the same
+};
+
+/// A shape the distances may take although nothing is missing, as large as one standard deviation.
+struct ErrorMode {
+  std::string source;  ///< registration, segmentation, numerical
+  Eigen::VectorXd shape_mm;
+};
+
+/// Everything but a missing effect that keeps distances from zero. With d the distances at a model that lacks nothing,
+///   d + mean_mm ~ N(0, Σ),   Σ = diag(noise²) + Σ_m shape_m shape_mᵀ + spread² exp(−|y_i − y_j| / length)
+struct ErrorSources {
+  Eigen::VectorXd noise_mm;  ///< #R
+  Eigen::VectorXd mean_mm;   ///< #R
+  std::vector<ErrorMode> modes;
+  double spread_mm = 0, length_mm = 1;  ///< what the mesh does beyond its modes; 0 = nothing
+};
+
+/// @param numerical  nullptr: no mesh was tried; then spread and length are those of @p fallback, fitted to the
+///   residual itself, and smooth effects count for little
+ErrorSources error_sources(const calibration::Residuals& residuals, const std::vector<Candidate>& candidates,
+                           const NumericalError* numerical, const calibration::ErrorModel& fallback,
+                           const Tolerances& tolerances = {});
+
+}  // namespace supine::diagnosis

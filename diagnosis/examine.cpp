@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/examine.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/held_out.h"
+#include "calibration/uncertainty.h"
+#include "common/error.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::FreeParameters;
+
+constexpr double least_worth = 3;
+constexpr double worth_share = 0.05;  // of the best score: what is further behind is not refitted
+
+double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
+
+void tell(const ExamineOptions& options, const std::string& what) {
+  if (options.progress) options.progress(what);
+}
+
+void measure_mesh(const Subject& subject, const calibration::Fit& fit, const ExamineOptions& options, Findings& found) {
+  if (!options.other_meshes) {
+    found.numerical_failure = "not asked for";
+    return;
+  }
+  tell(options, "two other meshes");
+  try {
+    found.numerical = measure_numerical_error(subject.fitted, subject.model, fit);
+  } catch (const NumericalFailure& failure) {
+    found.numerical_failure = failure.what();
+  }
+}
+
+/// Errors from the model as given; then the base model at the least of F, and the catalogue there.
+void fit_base(const Subject& subject, calibration::Evaluator& evaluator, const ExamineOptions& options,
+              Findings& found) {
+  const FreeParameters parameters(subject.model);
+  calibration::FitOptions as_given;
+  as_given.noise_mm = subject.noise_mm;
+  as_given.near = subject.near;
+  tell(options, "sensitivities");
+  const calibration::Fit fit = calibration::evaluate_fit(evaluator, parameters, as_given, parameters.start());
+  const auto errors = calibration::fit_error_model(fit.residuals, fit.linearisation.slope);
+  measure_mesh(subject, fit, options, found);
+  const auto candidates = find_candidates(evaluator, subject.model, fit, found.unseen);
+  found.sources = error_sources(fit.residuals, candidates, found.numerical ? &*found.numerical : nullptr, errors,
+                                options.tolerances);
+  found.whitening = Whitening::of(fit.residuals, found.sources);
+  found.metric = {&found.whitening, found.sources.mean_mm, fit.mask, subject.noise_mm};
+  tell(options, "fit under all errors");
+  found.base = weigh(evaluator, parameters, found.metric, parameters.start(), &fit.prediction.solution);
+  descend(evaluator, parameters, found.metric, DescentOptions{}, found.base);
+  found.model = parameters.model(found.base.fit.u);
+  found.free = parameters.names();
+  found.unseen.clear();
+  found.candidates = find_candidates(evaluator, found.model, found.base.fit, found.unseen);
+}
+
+void judge_base(const RefitProblem& problem, Findings& found) {
+  const calibration::Fit& fit = found.base.fit;
+  BaseFigures& f = found.figures;
+  f.rms_mm = rms(fit.residuals.distance_mm);
+  f.held_out_rms_mm =
+      rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, Eigen::VectorXd::Zero(fit.u.size()),
+                                          calibration::spatial_blocks(fit.residuals)));
+  f.noise_mm = rms(found.sources.noise_mm);
+  f.left = lack_of_fit(found.base, found.metric);
+  f.pose_rms_mm = unfitted_rms_mm(problem, found.model, fit.prediction.solution);
+}
+
+}  // namespace
+
+std::vector<std::string> worth_refitting(const ScoreTable& table, const std::vector<Candidate>& candidates,
+                                         const std::vector<double>& secants, std::size_t count) {
+  std::vector<std::pair<double, std::string>> ranked;
+  for (std::size_t c = 0; c < candidates.size(); ++c)
+    for (const Score& score : table.scores) {
+      if (score.effect != candidates[c].effect) continue;
+      const bool secant = !secants.empty() && std::isfinite(secants[c]);
+      const double statistic = std::max(score.statistic, secant ? secants[c] : 0.0);
+      ranked.emplace_back(statistic - 2 * score.freedom, score.effect);
+    }
+  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<std::string> effects;
+  for (const auto& [statistic, effect] : ranked)
+    if (effects.size() < count && statistic > std::max(least_worth, worth_share * ranked.front().first))
+      effects.push_back(effect);
+  return effects;
+}
+
+std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& options) {
+  auto found = std::make_unique<Findings>();
+  calibration::Evaluator evaluator(subject.fitted, subject.model);
+  fit_base(subject, evaluator, options, *found);
+  calibration::Residuals corrected = found->base.fit.residuals;
+  corrected.distance_mm += found->sources.mean_mm;
+  tell(options, "scores");
+  found->table = score_candidates(corrected, found->base.fit.linearisation.slope, found->candidates, found->whitening,
+                                  options.seed);
+  RefitProblem problem{subject.fitted,  subject.whole,  &found->model,
+                       &found->base,    &found->metric, std::log(found->whitening.effective_points()),
+                       options.progress};
+  judge_base(problem, *found);
+  const bool silent = !found->table.scores.empty() && found->table.scores.front().p_value >= options.rules.p_value &&
+                      found->figures.left.p_value >= options.rules.lack_of_fit_p;
+  if (!silent && options.refits > 0) {
+    tell(options, "effects at their usual size");
+    found->secants = secant_statistics(problem, found->candidates);
+    found->refits = refit_candidates(
+        problem, found->candidates, found->table,
+        worth_refitting(found->table, found->candidates, found->secants, static_cast<std::size_t>(options.refits)));
+  }
+  for (const Refit& refit : found->refits)
+    found->left.push_back(refit.solved ? lack_of_fit(refit.fit, found->metric) : LackOfFit{});
+  found->budget = error_budget(found->base, found->sources, found->metric);
+  found->diagnosis = decide(found->table, found->refits, found->left, found->figures, options.rules);
+  return found;
+}
+
+}  // namespace supine::diagnosis

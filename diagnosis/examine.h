@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/diagnose.h"
+#include "diagnosis/error_budget.h"
+
+namespace supine::diagnosis {
+
+/// What is examined. Everything it points to must outlive the findings.
+struct Subject {
+  calibration::Scene fitted;                        ///< poses that the model was fitted to
+  calibration::Scene whole;                         ///< those, then every other measured pose
+  simulation::Model model;                          ///< calibrated
+  std::vector<double> noise_mm;                     ///< per fitted measurement
+  const simulation::ChainSolution* near = nullptr;  ///< solution of the model, where known
+};
+
+struct ExamineOptions {
+  int refits = 6;            ///< candidates that are added and fitted again, at most; 0 = linear predictions only
+  bool other_meshes = true;  ///< measure the numerical error; false: take it from the residual itself
+  unsigned seed = 1;
+  Tolerances tolerances = {};
+  VerdictRules rules = {};
+  std::function<void(const std::string&)> progress = {};  ///< may be empty
+};
+
+/// All that one examination finds.
+struct Findings {
+  simulation::Model model;        ///< the base model, its free numbers at the least of F
+  std::vector<std::string> free;  ///< their names
+  WeightedFit base;
+  Metric metric;  ///< points into this object
+  Whitening whitening;
+  ErrorSources sources;
+  std::optional<NumericalError> numerical;  ///< none where no other mesh was tried, or none gave an answer
+  std::string numerical_failure;            ///< why not
+  std::vector<Candidate> candidates;
+  std::vector<std::string> unseen;  ///< effects that move no fitted point, here or anywhere
+  ScoreTable table;
+  std::vector<double> secants;  ///< per candidate (refit.h); empty where nothing was refitted
+  std::vector<Refit> refits;    ///< best first
+  std::vector<LackOfFit> left;  ///< per refit
+  BaseFigures figures;
+  ErrorBudget budget;
+  Diagnosis diagnosis;
+
+  Findings() = default;
+  Findings(const Findings&) = delete;
+  Findings& operator=(const Findings&) = delete;
+};
+
+/// The whole examination: numerical error on other meshes, a fit of the base model under all errors, scores of the
+/// catalogue, refits of those that could be it, the verdict. Reads nothing but @p subject.
+/// @throws NumericalFailure  no equilibrium of the model as given
+std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& options);
+
+/// Effects worth a refit: the @p count with the largest statistic, by slope or by secant, that are within reach of the
+/// best.
+/// @param secants  per candidate, NaN where there is none
+std::vector<std::string> worth_refitting(const ScoreTable& table, const std::vector<Candidate>& candidates,
+                                         const std::vector<double>& secants, std::size_t count);
+
+}  // namespace supine::diagnosis

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/next_measurement.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "calibration/model_skin.h"
+#include "calibration/scan_motion.h"
+#include "common/error.h"
+#include "diagnosis/chi_squared.h"
+#include "simulation/parameters.h"
+
+namespace supine::diagnosis {
+namespace {
+
+constexpr double seen_power = 0.5;
+
+/// A measurement that could be made: where "down" points. The fitted pose again needs no solve.
+struct Option {
+  std::string name;
+  Eigen::Vector3d down;
+  bool again = false;
+};
+
+/// From the gravity of the fitted pose and the patient's own directions (LPS: +z is the head).
+std::vector<Option> options_of(const Subject& subject) {
+  const Eigen::Vector3d down = subject.fitted.measurements[0]->pose.gravity, feet(0, 0, -1);
+  const auto tilted = [&down](double degrees, const Eigen::Vector3d& to) -> Eigen::Vector3d {
+    const double a = degrees * std::numbers::pi / 180;
+    return (std::cos(a) * down + std::sin(a) * to).normalized();
+  };
+  return {{subject.fitted.measurements[0]->pose.name + ", once more", down, true},
+          {"tilted 45 degrees, head up", tilted(45, feet)},
+          {"tilted 45 degrees to the outer side", tilted(45, subject.fitted.anatomy->lateral)},
+          {"upright", feet}};
+}
+
+/// Whitened slopes of what is free in the base model and of some effects, at one measurement.
+struct Slopes {
+  Eigen::MatrixXd base;
+  std::vector<Eigen::MatrixXd> effect;
+};
+
+Slopes present(const Findings& found, const std::vector<const Candidate*>& effects) {
+  Slopes slopes{found.whitening.apply(found.base.fit.linearisation.slope), {}};
+  for (const Candidate* effect : effects) slopes.effect.push_back(found.whitening.apply(effect->slope));
+  return slopes;
+}
+
+/// The skin of a pose as its scan would see it.
+class Pose {
+ public:
+  Pose(const Subject& subject, const Findings& found, const Option& option)
+      : found_(found),
+        load_{option.name, option.down},
+        chain_(*subject.fitted.mesh, *subject.fitted.anatomy, found.model, {subject.fitted.prone, load_}) {
+    simulation::ChainSolution near = found.base.fit.prediction.solution;
+    near.poses.resize(1);
+    near.poses[0].name = option.name;
+    solution_ = chain_.solve(found.model, &near);
+    sensitivities_ = std::make_unique<simulation::Sensitivities>(chain_, found.model, solution_);
+    const calibration::ModelSkin skin(*subject.fitted.mesh, solution_.poses[0].x);
+    nodes_ = skin.nodes();
+    place_ = skin.node_points();
+    normal_ = skin.node_normals();
+    factorise();
+  }
+
+  Eigen::MatrixXd white(const Eigen::MatrixXd& columns) const { return factor_.matrixL().solve(columns); }
+
+  Eigen::VectorXd slope(const std::string& parameter) {
+    const simulation::ChainDerivative derivative = sensitivities_->of(parameter);
+    const auto fields = chain_.fields(found_.model, load_, parameter);
+    Points moved = Points::Zero(place_.rows(), 3);
+    if (!simulation::derivatives_of(fields).scan_motion.isZero(0))
+      moved = calibration::corrected_derivative(fields.scan_motion, place_);
+    moved -= derivative.poses[0](nodes_, Eigen::all);
+    return moved.cwiseProduct(normal_).rowwise().sum();
+  }
+
+ private:
+  /// Noise of as many points per node as the fitted scan has, what the mesh does, and the scan's own place.
+  void factorise() {
+    const Eigen::Index n = place_.rows();
+    const double points = static_cast<double>(found_.base.fit.residuals.size()) / static_cast<double>(n);
+    const double nugget = found_.sources.noise_mm.squaredNorm() / static_cast<double>(found_.sources.noise_mm.size()) /
+                          std::max(1.0, points);
+    const double shared = found_.sources.spread_mm * found_.sources.spread_mm;
+    Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(n, n);
+    const Tolerances tolerances;
+    for (const auto& row : simulation::find_effect("misregistration")->parameters()) {
+      const double tolerance = row.unit == "rad" ? tolerances.registration_rad : tolerances.registration_mm;
+      const Eigen::VectorXd mode = tolerance * slope("misregistration." + row.name);
+      sigma.noalias() += mode * mode.transpose();
+    }
+    for (Eigen::Index i = 0; i < n; ++i)
+      for (Eigen::Index j = 0; j <= i; ++j)
+        sigma(i, j) += shared * std::exp(-(place_.row(i) - place_.row(j)).norm() / found_.sources.length_mm) +
+                       (i == j ? nugget : 0);
+    factor_.compute(sigma);
+  }
+
+  const Findings& found_;
+  simulation::PoseLoad load_;
+  simulation::Chain chain_;
+  simulation::ChainSolution solution_;
+  std::unique_ptr<simulation::Sensitivities> sensitivities_;
+  std::vector<int> nodes_;
+  Points place_, normal_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+};
+
+Slopes further(const Subject& subject, const Findings& found, const Option& option,
+               const std::vector<const Candidate*>& effects, const Slopes& now) {
+  if (option.again) return now;
+  Pose pose(subject, found, option);
+  const calibration::FreeParameters parameters(found.model);
+  const Eigen::VectorXd unit = parameters.slope(found.base.fit.u);
+  const auto rows = pose.slope(found.free.empty() ? std::string() : found.free[0]).size();
+  Slopes slopes{Eigen::MatrixXd(rows, parameters.size()), {}};
+  for (Eigen::Index i = 0; i < parameters.size(); ++i)
+    slopes.base.col(i) = unit[i] * pose.slope(parameters.names()[static_cast<std::size_t>(i)]);
+  slopes.base = pose.white(slopes.base);
+  for (const Candidate* effect : effects) {
+    Eigen::MatrixXd columns(rows, effect->slope.cols());
+    for (std::size_t k = 0; k < effect->parameters.size(); ++k)
+      columns.col(static_cast<Eigen::Index>(k)) = pose.slope(effect->parameters[k].name);
+    slopes.effect.push_back(pose.white(columns));
+  }
+  return slopes;
+}
+
+Eigen::MatrixXd stacked(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  Eigen::MatrixXd both(a.rows() + b.rows(), a.cols());
+  both << a, b;
+  return both;
+}
+
+/// The effect at its size, or as something to be fitted. A scan that lies elsewhere lies elsewhere in its own way each
+/// time: its parameters are others in the further pose.
+Eigen::MatrixXd fitted_columns(const Candidate& effect, const Eigen::MatrixXd& now, const Eigen::MatrixXd& then) {
+  if (effect.effect != "misregistration") return stacked(now, then);
+  Eigen::MatrixXd both = Eigen::MatrixXd::Zero(now.rows() + then.rows(), 2 * now.cols());
+  both.topLeftCorner(now.rows(), now.cols()) = now;
+  both.bottomRightCorner(then.rows(), then.cols()) = then;
+  return both;
+}
+
+double left_over(const Eigen::VectorXd& signal, const Eigen::MatrixXd& columns) {
+  const Eigen::VectorXd left = signal - columns * columns.completeOrthogonalDecomposition().solve(signal);
+  return left.squaredNorm();
+}
+
+/// Fitted value less null where there was a refit, the usual size else.
+Eigen::VectorXd size_of(const Findings& found, const Candidate& effect) {
+  Eigen::VectorXd size(static_cast<Eigen::Index>(effect.parameters.size()));
+  for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
+    size[static_cast<Eigen::Index>(k)] = effect.parameters[k].typical / std::sqrt(static_cast<double>(size.size()));
+    for (const Refit& refit : found.refits)
+      for (const FittedParameter& p : refit.parameters)
+        if (refit.solved && p.name == effect.parameters[k].name)
+          size[static_cast<Eigen::Index>(k)] = p.value - effect.parameters[k].null;
+  }
+  return size;
+}
+
+void rate_pairs(const Findings& found, const std::vector<const Candidate*>& effects, std::size_t in_set,
+                const Slopes& now, const Slopes& then, Separation& result) {
+  result.separation = std::numeric_limits<double>::infinity();
+  const Eigen::MatrixXd base = stacked(now.base, then.base);
+  for (std::size_t i = 0; i < in_set; ++i)
+    for (std::size_t j = 0; j < in_set; ++j) {
+      if (i == j) continue;
+      const bool moves = effects[i]->effect == "misregistration";
+      const Eigen::VectorXd size = size_of(found, *effects[i]);
+      Eigen::VectorXd signal(base.rows());
+      signal << now.effect[i] * size, (moves ? 0.0 : 1.0) * (then.effect[i] * size);
+      const Eigen::MatrixXd rival = fitted_columns(*effects[j], now.effect[j], then.effect[j]);
+      Eigen::MatrixXd columns(base.rows(), base.cols() + rival.cols());
+      columns << base, rival;
+      const double separation = left_over(signal, columns);
+      if (separation >= result.separation) continue;
+      result.separation = separation;
+      result.closest_pair = effects[i]->effect + " / " + effects[j]->effect;
+    }
+  if (in_set < 2) result.separation = 0;
+}
+
+void rate_unseen(const std::vector<const Candidate*>& effects, std::size_t from, const Slopes& now, const Slopes& then,
+                 Separation& result) {
+  const Eigen::MatrixXd base = stacked(now.base, then.base);
+  const auto solver = base.completeOrthogonalDecomposition();
+  double best = seen_power, sum = 0;
+  for (std::size_t e = from; e < effects.size(); ++e) {
+    Eigen::MatrixXd columns = stacked(now.effect[e], then.effect[e]);
+    columns -= base * solver.solve(columns);
+    double lambda = 0;
+    for (Eigen::Index k = 0; k < columns.cols(); ++k)
+      lambda += columns.col(k).squaredNorm() *
+                std::pow(effects[e]->parameters[static_cast<std::size_t>(k)].typical, 2) /
+                static_cast<double>(columns.cols());
+    const double power = chi_squared_power(static_cast<int>(columns.cols()), lambda);
+    sum += power;
+    if (power > best) best = power, result.shows = effects[e]->effect;
+  }
+  if (effects.size() > from) result.single_power = sum / static_cast<double>(effects.size() - from);
+}
+
+}  // namespace
+
+std::vector<std::string> not_seen(const Findings& found) {
+  std::vector<std::string> effects;
+  for (const Score& score : found.table.scores)
+    if (score.power < seen_power) effects.push_back(score.effect);
+  return effects;
+}
+
+std::vector<Separation> next_measurements(const Subject& subject, const Findings& found,
+                                          const std::vector<std::string>& set) {
+  std::vector<const Candidate*> effects;
+  const auto add = [&](const std::string& name) {
+    for (const Candidate& candidate : found.candidates)
+      if (candidate.effect == name) effects.push_back(&candidate);
+  };
+  for (const std::string& name : set) add(name);
+  const std::size_t in_set = effects.size();
+  for (const std::string& name : not_seen(found))
+    if (std::find(set.begin(), set.end(), name) == set.end()) add(name);
+  std::vector<Separation> list;
+  if (effects.empty()) return list;
+  const Slopes now = present(found, effects);
+  const std::vector<Option> options = options_of(subject);
+  std::vector<Separation> rated(options.size());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t o = 0; o < options.size(); ++o) {
+    try {
+      const Slopes then = further(subject, found, options[o], effects, now);
+      rated[o].measurement = options[o].name;
+      rate_pairs(found, effects, in_set, now, then, rated[o]);
+      rate_unseen(effects, in_set, now, then, rated[o]);
+    } catch (const NumericalFailure&) {
+      rated[o].measurement.clear();  // no equilibrium in that pose: nothing can be promised
+    }
+  }
+  for (Separation& s : rated)
+    if (!s.measurement.empty()) list.push_back(std::move(s));
+  std::stable_sort(list.begin(), list.end(), [](const Separation& a, const Separation& b) {
+    return a.separation != b.separation ? a.separation > b.separation : a.single_power > b.single_power;
+  });
+  return list;
+}
+
+}  // namespace supine::diagnosis

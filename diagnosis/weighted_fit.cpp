@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/weighted_fit.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "common/error.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::Evaluator;
+using calibration::FreeParameters;
+
+/// Whitened distances and their slopes, priors as further rows.
+struct Rows {
+  Eigen::VectorXd value;
+  Eigen::MatrixXd slope;
+};
+
+Rows rows_of(const calibration::Fit& fit, const FreeParameters& parameters, const Metric& metric) {
+  Eigen::MatrixXd columns(fit.residuals.size(), 1 + fit.linearisation.slope.cols());
+  columns << fit.residuals.distance_mm + metric.mean_mm, fit.linearisation.slope;
+  const Eigen::MatrixXd white = metric.whitening->apply(columns);
+  const Eigen::Index n = white.rows(), p = parameters.size();
+  Rows rows{Eigen::VectorXd::Zero(n + p), Eigen::MatrixXd::Zero(n + p, p)};
+  rows.value.head(n) = white.col(0);
+  rows.slope.topRows(n) = white.rightCols(p);
+  for (Eigen::Index j = 0; j < p; ++j)
+    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(j)]) {
+      rows.value[n + j] = (fit.u[j] - prior->mean) / prior->sd;
+      rows.slope(n + j, j) = 1 / prior->sd;
+    }
+  return rows;
+}
+
+void evaluate(const Rows& rows, Eigen::Index parameters, WeightedFit& fit) {
+  fit.objective = rows.value.squaredNorm();
+  fit.data = rows.value.head(rows.value.size() - parameters).squaredNorm();
+}
+
+/// Coordinates that may move: not those at an end of their range that pull further out.
+std::vector<int> movable(const FreeParameters& parameters, const Eigen::VectorXd& u, const Eigen::VectorXd& gradient) {
+  std::vector<int> free;
+  for (Eigen::Index i = 0; i < u.size(); ++i) {
+    const bool low = u[i] <= parameters.lower()[i] + 1e-9 && gradient[i] > 0;
+    const bool high = u[i] >= parameters.upper()[i] - 1e-9 && gradient[i] < 0;
+    if (!low && !high) free.push_back(static_cast<int>(i));
+  }
+  return free;
+}
+
+/// The damped step, cut at the range.
+Eigen::VectorXd step_of(const FreeParameters& parameters, const Rows& rows, const Eigen::VectorXd& u, double damping) {
+  const Eigen::VectorXd gradient = rows.slope.transpose() * rows.value;
+  const std::vector<int> free = movable(parameters, u, gradient);
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(u.size());
+  if (free.empty()) return step;
+  const Eigen::MatrixXd j = rows.slope(Eigen::all, free);
+  Eigen::MatrixXd h = j.transpose() * j;
+  h.diagonal() *= 1 + damping;
+  h.diagonal().array() += 1e-9 * h.diagonal().maxCoeff();
+  const Eigen::VectorXd part = -h.ldlt().solve(gradient(free));
+  constexpr double longest = 1.5;  // in coordinates: a factor of 4.5 in a modulus
+  const double cut = std::min(1.0, longest / std::max(part.cwiseAbs().maxCoeff(), 1e-300));
+  for (std::size_t k = 0; k < free.size(); ++k) step[free[k]] = cut * part[static_cast<Eigen::Index>(k)];
+  return parameters.clamped(u + step) - u;
+}
+
+}  // namespace
+
+WeightedFit weigh(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
+                  const Eigen::VectorXd& u, const simulation::ChainSolution* near) {
+  WeightedFit result;
+  calibration::Fit& fit = result.fit;
+  fit.u = u;
+  fit.mask = metric.mask;
+  fit.prediction = evaluator.predict(parameters.model(u), near);
+  fit.residuals = calibration::residuals_of(evaluator.scene(), fit.prediction, fit.mask, metric.noise_mm);
+  const simulation::Sensitivities sensitivities(evaluator.chain(), parameters.model(u), fit.prediction.solution);
+  fit.linearisation = calibration::linearise(evaluator, sensitivities, parameters, u, fit.prediction, fit.residuals);
+  evaluate(rows_of(fit, parameters, metric), parameters.size(), result);
+  result.evaluations = 1;
+  return result;
+}
+
+void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
+             const DescentOptions& options, WeightedFit& fit) {
+  double damping = 1e-3;
+  fit.converged = false;
+  for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
+    const Rows rows = rows_of(fit.fit, parameters, metric);
+    const Eigen::VectorXd step = step_of(parameters, rows, fit.fit.u, damping);
+    const double promised = fit.objective - (rows.value + rows.slope * step).squaredNorm();
+    if (promised < options.settled) {
+      fit.converged = true;
+      return;
+    }
+    const simulation::ChainSolution near =
+        calibration::extrapolated(fit.fit.prediction.solution, fit.fit.linearisation.by_coordinate, step);
+    ++fit.evaluations;
+    try {
+      WeightedFit trial = weigh(evaluator, parameters, metric, fit.fit.u + step, &near);
+      if (trial.objective < fit.objective) {
+        const double kept = (fit.objective - trial.objective) / promised;
+        trial.evaluations = fit.evaluations;
+        fit = std::move(trial);
+        damping = kept > 0.5 ? damping / 5 : damping * 2;
+        continue;
+      }
+    } catch (const NumericalFailure&) {
+      // No equilibrium there: a shorter step.
+    }
+    damping = std::max(10 * damping, 0.1);
+    if (damping > 1e4) return;
+  }
+}
+
+Eigen::MatrixXd information(const WeightedFit& fit, const FreeParameters& parameters, const Metric& metric) {
+  const Rows rows = rows_of(fit.fit, parameters, metric);
+  return rows.slope.transpose() * rows.slope;
+}
+
+}  // namespace supine::diagnosis

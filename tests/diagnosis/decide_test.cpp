@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <gtest/gtest.h>
+
+#include "diagnosis/diagnose.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using Names = std::vector<std::string>;
+
+ScoreTable table_with(double p) {
+  Score score{};
+  score.effect = "ligament", score.p_value = p;
+  return {{score}, 1.3, 1.4, 100};
+}
+
+Refit refit(const std::string& effect, double bic, double held_out, std::vector<double> poses = {}) {
+  Refit r;
+  r.effect = effect, r.solved = r.finished = true, r.bic = bic, r.held_out_rms_mm = held_out;
+  r.pose_rms_mm = std::move(poses);
+  return r;
+}
+
+const LackOfFit real_left{3, 1e-9}, nothing_left{1, 0.4};
+
+BaseFigures base_figures(const LackOfFit& left) { return {1.3, 1.4, 0.7, {}, left}; }
+
+Diagnosis verdict(const std::vector<Refit>& refits, const LackOfFit& after = nothing_left, double p = 0.001) {
+  return decide(table_with(p), refits, std::vector<LackOfFit>(refits.size(), after), base_figures(real_left));
+}
+
+TEST(Decide, NamesTheOneThatStandsOut) {
+  const Diagnosis d = verdict({refit("ligament", 60, 0.8), refit("adhesion", 20, 0.95)});
+  EXPECT_EQ(d.verdict, Verdict::missing);
+  EXPECT_EQ(d.missing, Names{"ligament"});
+}
+
+TEST(Decide, NamesAllThatDoAsWellMeasurementFirst) {
+  const Diagnosis d = verdict({refit("adhesion", 60, 0.8), refit("misregistration", 57, 0.8)});
+  EXPECT_EQ(d.verdict, Verdict::ambiguous);
+  EXPECT_EQ(d.missing, (Names{"misregistration", "adhesion"}));
+}
+
+TEST(Decide, AHeldOutPoseTellsApartAndBringsBack) {
+  EXPECT_EQ(verdict({refit("adhesion", 60, 0.8, {0.9}), refit("ligament", 57, 0.8, {1.4})}).missing, Names{"adhesion"});
+  const Diagnosis back = verdict({refit("adhesion", 60, 0.8, {1.4}), refit("ligament", 20, 0.8, {0.9})});
+  EXPECT_EQ(back.verdict, Verdict::ambiguous);
+  EXPECT_EQ(back.missing, (Names{"adhesion", "ligament"}));
+}
+
+TEST(Decide, DoesNotNameWhatTheHeldOutErrorDoesNotConfirm) {
+  const Diagnosis d = verdict({refit("ligament", 60, 1.39)});
+  EXPECT_EQ(d.verdict, Verdict::unexplained);
+  EXPECT_EQ(d.missing, Names{"ligament"});
+  const auto quiet =
+      decide(table_with(0.001), {refit("ligament", 60, 1.39)}, {nothing_left}, base_figures(nothing_left));
+  EXPECT_EQ(quiet.verdict, Verdict::nothing_missing);
+}
+
+TEST(Decide, NamesNothingByChance) {
+  const auto d = decide(table_with(0.2), {refit("ligament", 60, 0.8)}, {nothing_left}, base_figures(nothing_left));
+  EXPECT_EQ(d.verdict, Verdict::nothing_missing);
+  EXPECT_TRUE(d.missing.empty());
+}
+
+TEST(Decide, TheBestThatLeavesARealResidualIsNamedAsNoMoreThanThat) {
+  const Diagnosis d = verdict({refit("ligament", 60, 1.0), refit("adhesion", 58, 1.0)}, real_left);
+  EXPECT_EQ(d.verdict, Verdict::unexplained);
+  EXPECT_EQ(d.missing, Names{"ligament"});
+  EXPECT_GT(d.left.misfit, 2);
+}
+
+TEST(Decide, ARefitThatWasGivenUpEarlyIsNotNamed) {
+  Refit early = refit("ligament", 60, 0.8);
+  early.finished = false;
+  EXPECT_EQ(verdict({early, refit("adhesion", 20, 0.8)}).missing, Names{"adhesion"});
+}
+
+}  // namespace
+}  // namespace supine::diagnosis
