@@ -57,7 +57,7 @@ for n in 400 700 1300; do solve quadratic "$n" --order 2 --fine "$work/breast.vt
 solve reference 7000 --skin-edge-mm "$(quarter 7000)"
 
 reference=$work/reference-7000/supine.vtu
-[ -e "$reference" ] || reference=$work/graded-5000/supine.vtu
+[ -e "$reference" ] || reference=$work/linear-10000/supine.vtu
 echo "kind,triangles,nodes,scan_rms_mm,landmarks_mm,surface_rms_mm,surface_max_mm,marks_rms_mm" >"$work/mesh_choice.csv"
 for row in "${rows[@]}"; do
   [ -e "$work/$row/row.csv" ] || continue

@@ -10,6 +10,9 @@ namespace supine::calibration {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+/// In ln(value): a modulus goes by a factor of 4.5 at most. A first step from far away may ask for a tissue that cannot
+/// carry itself, and finding that out costs more than many runs.
+constexpr double longest_step = 1.5;
 
 int prior_count(const FreeParameters& parameters, const FitOptions& options) {
   if (!options.use_priors) return 0;
@@ -44,8 +47,15 @@ void ChainCost::warm_start(const Eigen::VectorXd& u, const Prediction& predictio
   if (linearisation == nullptr) note(u, false);
 }
 
+bool ChainCost::too_far(const Eigen::VectorXd& u) const {
+  for (Eigen::Index j = 0; j < u.size() && accepted_.u.size() == u.size(); ++j)
+    if (parameters_.is_log(j) && std::abs(u[j] - accepted_.u[j]) > longest_step) return true;
+  return false;
+}
+
 bool ChainCost::predict(const Eigen::VectorXd& u) const {
   if (trial_.u.size() == u.size() && trial_.u == u) return true;
+  if (too_far(u)) return false;  // the line search comes closer
   ++log_.evaluations;
   try {
     const bool warm = accepted_.u.size() == u.size();

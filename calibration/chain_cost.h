@@ -38,6 +38,7 @@ class ChainCost : public ceres::CostFunction {
 
  private:
   bool predict(const Eigen::VectorXd& u) const;
+  bool too_far(const Eigen::VectorXd& u) const;
   void note(const Eigen::VectorXd& u, bool failed) const;
   Eigen::VectorXd weighted(const State& state) const;
   void accept(const Eigen::VectorXd& residuals) const;

@@ -106,9 +106,7 @@ class Minimisation {
     std::vector<double> objective(asked.size());
     for (std::size_t i = 0; i < asked.size(); ++i) values[i] = axes_.inside(asked[i], objective[i]);
     const double before = best_.mae_study_mm;
-    const auto results = pool_.run(values, journal_, [this](const RunResult&) {
-      if (options_.progress) options_.progress(best_.evaluations, best_.failed, best_.mae_study_mm);
-    });
+    const auto results = pool_.run(values, journal_, live_progress());
     double least = failed_mm, most = 0;
     for (std::size_t i = 0; i < asked.size(); ++i) {
       note(values[i], results[i]);
@@ -121,6 +119,18 @@ class Minimisation {
     flat_ = flat ? flat_ + 1 : 0;
     decide();
     return objective;
+  }
+
+  /// Told run by run; best_ is brought up to date only after the generation, in the order of its draws.
+  std::function<void(const RunResult&)> live_progress() const {
+    if (!options_.progress) return {};
+    return [this, done = best_.evaluations, failed = best_.failed,
+            least = best_.mae_study_mm](const RunResult& result) mutable {
+      ++done;
+      failed += result.failed;
+      if (!result.failed) least = std::min(least, result.mae_study_mm);
+      options_.progress(done, failed, least);
+    };
   }
 
   void note(const Eigen::VectorXd& values, const RunResult& result) {

@@ -10,12 +10,19 @@
 #include "simulation/parameters.h"
 
 namespace supine::calibration {
+namespace {
+
+/// Among many draws some tissue is too soft to carry itself. Creeping up to the load at which it collapses would cost
+/// as much as dozens of runs, and tells nothing.
+const simulation::SolveOptions brief{.max_iterations = 25, .smallest_load_step = 1.0 / 8, .progress = {}};
+
+}  // namespace
 
 EvaluatorPool::EvaluatorPool(const Scene& scene, const FreeParameters& parameters, simulation::ChainSolution reference,
                              int threads)
     : parameters_(parameters), reference_(std::move(reference)) {
   for (int t = 0; t < std::max(1, threads); ++t)
-    evaluators_.push_back(std::make_unique<Evaluator>(scene, parameters.base()));
+    evaluators_.push_back(std::make_unique<Evaluator>(scene, parameters.base(), brief));
 }
 
 RunResult EvaluatorPool::evaluate(Evaluator& evaluator, const Eigen::VectorXd& values) const {

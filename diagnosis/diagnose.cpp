@@ -113,6 +113,8 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
     if (refit.finished && refit.bic > 0 && improves(refit.held_out_rms_mm, base, rules)) good.push_back(&refit);
   if (good.empty()) {
     result.why = "no effect of the catalogue lowers the held-out error";
+    if (!refits.empty() && refits.front().finished && refits.front().bic > rules.bic)
+      result.why += fmt::format("; {} fits best (p {:.3f}) but is not confirmed", refits.front().effect, p);
     if (!real(base.left)) return result;
     result.verdict = Verdict::unexplained;
     if (!refits.empty()) result.missing = {refits.front().effect};

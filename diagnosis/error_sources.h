@@ -15,7 +15,7 @@ namespace supine::diagnosis {
 struct Tolerances {
   double registration_mm = 0.3;      ///< shift of the scan, 1 sigma in each direction
   double registration_rad = 0.0036;  ///< turn of the scan: 0.3 mm at 80 mm
-  double segmentation_mm = 0.2;      ///< offset of the imaged skin: about an eighth of a 1.5 mm voxel
+  double segmentation_mm = 0.3;      ///< offset of the imaged skin: a fifth of a 1.5 mm voxel
   double incompressibility = 0.25;   ///< of the catalogue's a: linear tetrahedra lock, and ν itself is assumed
   double correction = 1;             ///< of the finer mesh's change is added to the distances, give or take the same
 };

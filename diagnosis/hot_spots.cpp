@@ -11,7 +11,7 @@
 namespace supine::diagnosis {
 namespace {
 
-constexpr int smoothing_rounds = 2;
+constexpr int smoothing_rounds = 1;
 
 /// Sums of weights and weighted distances by node, and of squares for the standard error.
 struct Sums {

@@ -296,4 +296,42 @@ void write_diagnosis_files(Run& run, const MeasuredCase& measured, const Diagnos
   }
 }
 
+Json ladder_figures(const diagnosis::Ladder& ladder) {
+  const auto rung = [](const diagnosis::Rung& r) {
+    return Json{{"added", r.added},
+                {"mae_mm", r.mae_mm},
+                {"rms_mm", r.rms_mm},
+                {"held_out_rms_mm", r.held_out_rms_mm},
+                {"held_out_pose_rms_mm", number_or_null(r.held_out_pose_rms_mm)},
+                {"p_value", r.p_value}};
+  };
+  Json f;
+  f["rungs"] = Json::array();
+  for (const auto& r : ladder.rungs) f["rungs"].push_back(rung(r));
+  const auto& other = ladder.random_other;
+  f["controls"] = {{"refit_only", rung(ladder.rungs.front())},
+                   {"random_other", other.added.empty() ? Json(nullptr) : rung(other)}};
+  f["verdict"] = diagnosis::verdict_name(ladder.verdict);
+  f["missing"] = ladder.missing;
+  f["stopped"] = ladder.stopped;
+  f["noise_floor_mm"] = ladder.noise_floor_mm;
+  f["parameters"] = Json::object();
+  const calibration::FreeParameters parameters(ladder.model);
+  for (Eigen::Index i = 0; i < parameters.size(); ++i)
+    f["parameters"][parameters.names()[static_cast<std::size_t>(i)]] = parameters.value(i, parameters.start()[i]);
+  return f;
+}
+
+void say_ladder(const Run& run, const diagnosis::Ladder& ladder) {
+  const auto line = [&run](const std::string& name, const diagnosis::Rung& r) {
+    run.say(fmt::format("  {:<28}{:>8.3f}{:>8.3f}{:>10.3f}{:>10}", name, r.mae_mm, r.rms_mm, r.held_out_rms_mm,
+                        r.held_out_pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", r.held_out_pose_rms_mm[0])));
+  };
+  run.say(fmt::format("  {:<28}{:>8}{:>8}{:>10}{:>10}", "ladder, mm", "MAE", "RMS", "held out", "pose"));
+  line("refit only", ladder.rungs.front());
+  if (!ladder.random_other.added.empty()) line("random: + " + ladder.random_other.added, ladder.random_other);
+  for (std::size_t r = 1; r < ladder.rungs.size(); ++r) line("+ " + ladder.rungs[r].added, ladder.rungs[r]);
+  run.say(fmt::format("  noise and mesh alone would leave {:.2f}; stopped: {}", ladder.noise_floor_mm, ladder.stopped));
+}
+
 }  // namespace supine::pipeline

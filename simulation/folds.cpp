@@ -40,9 +40,9 @@ Folds find_folds(const Indices& cells, const Points& shape) {
 std::string folds_warning(const std::string& name, const Folds& folds) {
   if (folds.cells == 0) return {};
   return fmt::format(
-      "{}: {} quadratic cell{} inside out near a corner, the worst (cell {}, {:.2f} of its mean volume ratio) at "
+      "{}: {} quadratic cell{} inside out near a corner, the worst (cell {}, determinant there {:.2f} of its mean) at "
       "({:.1f}, {:.1f}, {:.1f}) mm. Between their quadrature points such cells mean nothing: the answer stands "
-      "elsewhere; a finer mesh there (supine-tetrahedralise --skin-edge-mm) resolves it",
+      "elsewhere; do not read anything into that place, or compare with linear cells (--order 1)",
       name, folds.cells, folds.cells == 1 ? " is" : "s are", folds.worst_cell, folds.worst, folds.place_mm.x(),
       folds.place_mm.y(), folds.place_mm.z());
 }

@@ -5,6 +5,7 @@
 
 #include <Eigen/CholmodSupport>
 #include <Eigen/UmfPackSupport>
+#include <mutex>
 #include <vector>
 
 #include "common/error.h"
@@ -22,6 +23,10 @@ namespace supine::simulation {
 namespace {
 
 void use_one_blas_thread() { openblas_set_num_threads(1); }
+
+/// METIS draws from the C library's one rand(), seeded anew by every call: two at a time would draw from each other's
+/// numbers, and orderings (so the last digits of every solve) would depend on chance.
+std::mutex metis_at_work;
 
 /// CHOLMOD asks for four threads whatever OMP_NUM_THREADS says; on two cores they cost more than they give.
 class SingleThreaded {
@@ -100,6 +105,7 @@ std::vector<int> node_ordering(const SparseMatrix& matrix, cholmod_common& commo
 CholeskySolver::CholeskySolver(const SparseMatrix& pattern) : state_(std::make_unique<State>()) {
   use_one_blas_thread();
   const SingleThreaded guard;
+  const std::lock_guard alone(metis_at_work);
   std::vector<int> order = node_ordering(pattern, state_->common);
   state_->common.nmethods = 1;
   state_->common.method[0].ordering = CHOLMOD_GIVEN;
@@ -157,6 +163,7 @@ LuSolver::LuSolver(const SparseMatrix& pattern) : state_(std::make_unique<State>
   state_->solver.umfpackControl()[UMFPACK_ORDERING] = UMFPACK_ORDERING_METIS;
   state_->solver.umfpackControl()[UMFPACK_IRSTEP] = 0;  // refinement triples the cost of a solve and is not needed
   state_->matrix = pattern;
+  const std::lock_guard alone(metis_at_work);
   state_->solver.analyzePattern(state_->matrix);
 }
 

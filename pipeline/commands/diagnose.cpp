@@ -44,6 +44,9 @@ class DiagnoseTool : public Tool {
                    "how well the imaged skin's place is known, 1 sigma")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
+    app.add_flag("--ladder", ladder_,
+                 "add what is missing, fit and examine again, until nothing is missing or three effects were added; "
+                 "writes ladder.json, the fitted numbers in it");
     app.add_option("--seed", options_.seed, "of the draws behind the p values")->capture_default_str();
   }
 
@@ -67,6 +70,12 @@ class DiagnoseTool : public Tool {
     write_diagnosis_files(run, *measured, result, folder());
     run.figures(folder() / "diagnosis.vtp").update(diagnosis_figures(result));
     say_diagnosis(run, result);
+    if (ladder_) {
+      run.stage("ladder");
+      const auto ladder = diagnosis::climb(subject_of(*measured, measured->model, noise), options_, *result.found);
+      run.figures(folder() / "ladder.json") = ladder_figures(ladder);
+      say_ladder(run, ladder);
+    }
     return Outcome::done;
   }
 
@@ -88,7 +97,7 @@ class DiagnoseTool : public Tool {
 
   fs::path case_folder_, mesh_file_, model_file_;
   diagnosis::ExamineOptions options_;
-  bool no_other_meshes_ = false;
+  bool no_other_meshes_ = false, ladder_ = false;
 };
 
 }  // namespace
