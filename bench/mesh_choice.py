@@ -33,8 +33,9 @@ def main():
         axis.set_xlabel("boundary triangles")
         axis.set_ylabel("RMS to the reference, mm")
         axis.grid(True, which="both", alpha=0.3)
-    axes[0].legend()
-    figure.tight_layout()
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncol=4)
+    figure.tight_layout(rect=(0, 0.07, 1, 1))
     figure.savefig(sys.argv[2], dpi=120)
 
 

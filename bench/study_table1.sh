@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 # The study's table 1 (F3): three starts, CMA-ES with several seeds each, and least squares from the same starts.
 # On a null (neo-Hookean, made by an independent program), and on data made with the study's own corotational law, at
-# 0.8 and 40 kPa: with its own 0.32 and 22.72 that law has no equilibrium on this shape.
+# 0.8 and 40 kPa: with its own 22.72 and even 0.5 that law has no equilibrium on this shape.
 # CMA-ES stops, as in the study, when the MAE is under a threshold: 1.02 times that of the least-squares answer.
 # Then the map of the error (ridge.png) with every answer on it.
 #

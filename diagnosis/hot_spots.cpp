@@ -11,6 +11,7 @@
 namespace supine::diagnosis {
 namespace {
 
+constexpr double neighbour_share = 0.25;  // six of them count for more than the node itself
 constexpr int smoothing_rounds = 1;
 
 /// Sums of weights and weighted distances by node, and of squares for the standard error.
@@ -18,16 +19,16 @@ struct Sums {
   Eigen::VectorXd weight, value, variance;
 };
 
-/// Every node takes half of what its neighbours have on the mean: a few millimetres per round.
+/// Every node takes a share of what its neighbours have: about an edge wider per round.
 Sums spread(const Sums& sums, const Triangles& triangles) {
   Sums wider = sums;
   for (Eigen::Index t = 0; t < triangles.rows(); ++t)
     for (int k = 0; k < 3; ++k) {
       const int a = triangles(t, k), b = triangles(t, (k + 1) % 3);
       // Each inner edge is seen from both sides, so once per direction.
-      wider.weight[a] += 0.5 * sums.weight[b];
-      wider.value[a] += 0.5 * sums.value[b];
-      wider.variance[a] += 0.25 * sums.variance[b];
+      wider.weight[a] += neighbour_share * sums.weight[b];
+      wider.value[a] += neighbour_share * sums.value[b];
+      wider.variance[a] += neighbour_share * neighbour_share * sums.variance[b];
     }
   return wider;
 }

@@ -158,10 +158,10 @@ simulation::EffectSetting free_setting(const std::string& name) {
   const simulation::Effect& effect = *simulation::find_effect(name);
   simulation::EffectSetting setting = simulation::null_setting(effect);
   for (const Parameter& row : effect.parameters()) {
-    const bool logarithmic = row.lower > 0;  // as FreeParameters takes it
-    const double sd = logarithmic ? row.median * std::expm1(row.log_sd) : row.log_sd;
-    setting.parameters[row.name] = {row.median, true, {}, row.lower, row.upper};
-    if (!is_strength(effect, row)) setting.parameters[row.name].prior_sd = sd;
+    if (is_strength(effect, row))
+      setting.parameters[row.name] = {row.median, true, {}, row.lower, row.upper};
+    else
+      setting.parameters[row.name].value = row.median;
   }
   return setting;
 }

@@ -32,8 +32,7 @@ struct Refit {
 };
 
 /// The effect with its strength free and without a prior, because how large it usually is shall not decide whether it
-/// is there; its place and shape free with the catalogue's prior, because where they are not known the strength is not
-/// either.
+/// is there; its place and shape fixed at the catalogue's.
 simulation::EffectSetting free_setting(const std::string& effect);
 
 /// What all refits start from.
