@@ -69,7 +69,7 @@ void judge_base(const RefitProblem& problem, Findings& found) {
                                           calibration::spatial_blocks(fit.residuals)));
   f.noise_mm = rms(found.sources.noise_mm);
   f.left = lack_of_fit(found.base, found.metric);
-  f.pose_rms_mm = unfitted_rms_mm(problem, found.model, fit.prediction.solution);
+  f.pose_rms_mm = unfitted_rms_mm(problem, found.model);
 }
 
 }  // namespace

@@ -74,7 +74,8 @@ Job prepared(const RefitProblem& problem, const Candidate& candidate, const Scor
     const double reach = 3 * p.typical;  // a line drawn further than that is no longer the effect
     const double cut = std::clamp(std::clamp(wanted, p.null - reach, p.null + reach), p.lower, p.upper);
     step.emplace_back(p.name, cut);
-    const double sign = wanted < p.null ? -1 : 1;
+    // The slope at the null may point the wrong way where an effect is far from linear.
+    const double sign = wanted < p.null && !p.one_sided ? -1 : 1;
     usual.emplace_back(p.name, std::clamp(p.null + sign * p.typical, p.lower, p.upper));
     differ |= std::abs(cut - usual.back().second) > 0.5 * p.typical;
   }
@@ -137,7 +138,7 @@ Refit summary(const RefitProblem& problem, Job& job) {
                                                               calibration::spatial_blocks(fit.residuals)));
   refit.parameters = fitted_parameters(problem, job);
   refit.model = job.parameters->model(fit.u);
-  if (job.finished) refit.pose_rms_mm = unfitted_rms_mm(problem, refit.model, fit.prediction.solution);
+  if (job.finished) refit.pose_rms_mm = unfitted_rms_mm(problem, refit.model);
   refit.fit = std::move(job.fit);
   return refit;
 }
@@ -166,15 +167,12 @@ simulation::EffectSetting free_setting(const std::string& name) {
   return setting;
 }
 
-std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model,
-                                    const simulation::ChainSolution& near) {
+std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model) {
   std::vector<double> all;
   const std::size_t fitted = problem.scene.measurements.size();
   if (problem.whole.measurements.size() == fitted) return all;
   try {
     calibration::Evaluator evaluator(problem.whole, model);
-    simulation::ChainSolution start = near;
-    start.poses.clear();  // the shape without gravity is known, the poses are not all
     const calibration::Prediction prediction = evaluator.predict(model);
     for (std::size_t m = fitted; m < problem.whole.measurements.size(); ++m) {
       const auto& distances = prediction.poses[m].distances;

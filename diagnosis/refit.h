@@ -57,7 +57,6 @@ std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vect
                                     const ScoreTable& table, const std::vector<std::string>& which);
 
 /// Root mean square distance of each pose that is not fitted.
-std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model,
-                                    const simulation::ChainSolution& near);
+std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model);
 
 }  // namespace supine::diagnosis
