@@ -7,20 +7,41 @@
 
 namespace supine::reconstruction {
 
-std::vector<MeshEdge> mesh_edges(const Triangles& triangles) {
-  struct HalfEdge {
-    int low, high, triangle;
-    bool ascending;
+namespace {
+
+struct HalfEdge {
+  int low, high, triangle;
+  bool ascending;
+};
+
+/// Ordered by lower point, higher point and triangle. Counted into place by their lower points, of which each has few.
+std::vector<HalfEdge> half_edges_by_lower_point(const Triangles& triangles) {
+  if (triangles.rows() == 0) return {};
+  const int least = triangles.minCoeff();
+  std::vector<std::size_t> first(static_cast<std::size_t>(triangles.maxCoeff() - least) + 2, 0);
+  const auto visit = [&triangles](const auto& use) {
+    for (Eigen::Index t = 0; t < triangles.rows(); ++t)
+      for (int c = 0; c < 3; ++c) {
+        const int a = triangles(t, c), b = triangles(t, (c + 1) % 3);
+        use(HalfEdge{std::min(a, b), std::max(a, b), static_cast<int>(t), a < b});
+      }
   };
-  std::vector<HalfEdge> half(3 * triangles.rows());
-  for (Eigen::Index t = 0; t < triangles.rows(); ++t)
-    for (int c = 0; c < 3; ++c) {
-      const int a = triangles(t, c), b = triangles(t, (c + 1) % 3);
-      half[3 * t + c] = {std::min(a, b), std::max(a, b), static_cast<int>(t), a < b};
-    }
-  std::sort(half.begin(), half.end(), [](const HalfEdge& x, const HalfEdge& y) {
-    return std::tie(x.low, x.high, x.triangle) < std::tie(y.low, y.high, y.triangle);
-  });
+  visit([&](const HalfEdge& edge) { ++first[edge.low - least + 1]; });
+  for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+  std::vector<HalfEdge> half(first.back());
+  std::vector<std::size_t> next(first.begin(), first.end() - 1);
+  visit([&](const HalfEdge& edge) { half[next[edge.low - least]++] = edge; });
+  for (std::size_t i = 0; i + 1 < first.size(); ++i)
+    std::sort(half.begin() + first[i], half.begin() + first[i + 1], [](const HalfEdge& x, const HalfEdge& y) {
+      return std::tie(x.high, x.triangle) < std::tie(y.high, y.triangle);
+    });
+  return half;
+}
+
+}  // namespace
+
+std::vector<MeshEdge> mesh_edges(const Triangles& triangles) {
+  const std::vector<HalfEdge> half = half_edges_by_lower_point(triangles);
   std::vector<MeshEdge> edges;
   edges.reserve(half.size() / 2);
   for (std::size_t i = 0; i < half.size();) {
