@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
-#   make demo                        install what is missing, build, run the sample case, print what came out
+#   make demo                        install what is missing, build, take the sample from its MRI to the report
 #   make test                        the same set-up, then every test
 #   make CASE=dir [OUT=dir] [stage]  run a case: segment reconstruct decimate mesh simulate compare, or as far as its data allow;
-#                                    then calibrate, diagnose
-#   make build                       only build, into $(BUILD)
+#                                    then calibrate, diagnose, ladder; report: one page of what is there
+#   make build                       only build, into $(BUILD); make tools: without tests and measurements
 #   make bench [DATA=dir]            every measurement of docs/verification.md and docs/performance.md: hours, on a quiet machine
 #   make study [DATA=dir]            every table of docs/study.md: an hour or more, on a quiet machine
+#   make hidden N=60 [SEED=1]        N cases with a sealed answer, each diagnosed from its folder alone; confusion matrix
 
 SHELL := /bin/bash
 BUILD ?= build
@@ -14,21 +15,21 @@ CONFIG ?= Release
 # One compiler per core, as far as 1.5 GB of free memory for each allow: heavy templates.
 JOBS ?= $(shell awk -v cores=$$(nproc) '/^MemAvailable/ { m = int($$2 / 1572864); n = m < cores ? m : cores; print n < 1 ? 1 : n }' /proc/meminfo)
 
-stages := segment reconstruct decimate mesh simulate compare calibrate diagnose summary
+stages := segment reconstruct decimate mesh simulate compare calibrate diagnose ladder report summary
 run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 
 DATA ?= ../shared/data
 
-.PHONY: bench study demo test build setup clean help case $(stages)
+.PHONY: bench study hidden demo test build tools configure setup clean help case $(stages)
 
 ifdef CASE
-case: build
+case: tools
 	$(run_case)
-$(stages): build
+$(stages): tools
 	$(run_case) $@
 else
 help:
-	@sed -n '3,10s/^#//p' Makefile
+	@sed -n '3,/^$$/s/^#//p' Makefile
 $(stages):
 	@echo "Which case? make CASE=dir $@" >&2; exit 2
 endif
@@ -36,15 +37,24 @@ endif
 setup:
 	@pipeline/setup.sh
 
-build: setup
+configure: setup
 	@[ -f $(BUILD)/build.ninja ] || cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=$(CONFIG)
+
+build: configure
 	@cmake --build $(BUILD) --parallel $(JOBS)
 
-demo: build
+# A case needs no tests and measurements: half of the work.
+tools: configure
+	@cmake --build $(BUILD) --parallel $(JOBS) --target tools
+
+demo: tools
 	$(run_case) CASE=samples/ligament
 	@echo
-	@echo "The RMS is well above the scanner's noise on purpose: this patient has a ligament that the model lacks. Give it one:"
-	@echo "  cp -r samples/ligament mycase && $(BUILD)/bin/supine-model add ligament mycase/model.toml && make CASE=mycase"
+	@echo "The RMS is well above the scanner's noise on purpose. Calibrating, and asking what the model lacks: a minute or two."
+	$(run_case) CASE=samples/ligament diagnose report
+	@echo
+	@echo "Open samples/ligament/out/report.html in a browser. To see the error fall on the body as what is missing is added:"
+	@echo "  make CASE=samples/ligament ladder report"
 
 test: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel 2
@@ -54,6 +64,12 @@ study: build
 
 bench: build
 	@bench/run_all.sh $(DATA) $(BUILD)/bench $(BUILD)/bin
+
+# Goes on where an earlier call stopped; docs/hidden.md.
+N ?= 60
+SEED ?= 1
+hidden: build
+	@bench/hidden.py $(BUILD)/hidden-$(SEED) --bin $(BUILD)/bin --cases $(N) --seed $(SEED) $(HIDDEN)
 
 clean:
 	rm -rf $(BUILD)

@@ -7,25 +7,7 @@
 #   bench/mesh_choice.sh DATA/hidden-open CASE WORK [BIN]
 #
 # Results already in WORK are kept: an interrupted study goes on, a row is redone by deleting its folder.
-set -euo pipefail
-data=${1:?folder with the cases and answers/}
-name=${2:?case, for example null-1}
-work=${3:?folder for the results}
-bin=${4:-build/bin}
-case=$data/$name
-export OMP_NUM_THREADS=1
-
-# tool NAME ARGUMENTS…: exit code 1 (written, a target was not met) does not stop the run.
-tool() { "$bin/supine-$1" "${@:2}" --force --quiet 2>>"$work/messages.txt" || [ $? -eq 1 ]; }
-
-mkdir -p "$work"
-if [ ! -e "$work/truth.toml" ]; then
-  tool segment "$case" -o "$work/labels.vti"
-  tool reconstruct "$work/labels.vti" -o "$work"
-  breast=$(jq -r .parameters.Eb "$data/answers/$name.json") skin=$(jq -r .parameters.Es "$data/answers/$name.json")
-  sed "/^\[breast\]/,/^\[skin\]/s/value = [0-9.]*/value = $breast/; /^\[skin\]/,/^\[interface\]/s/value = [0-9.]*/value = $skin/" \
-    "$case/model.toml" >"$work/truth.toml"
-fi
+source "$(dirname "$0")/mesh_common.sh"
 
 # solve KIND TRIANGLES OPTIONS…: meshes, solves, compares with the scan; one row.
 rows=()

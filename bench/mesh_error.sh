@@ -4,23 +4,7 @@
 # against the scan and against the last one that could be solved. Prints a table (docs/verification.md).
 #
 #   bench/mesh_error.sh DATA/hidden-open CASE WORK [BIN]
-set -euo pipefail
-data=${1:?folder with the cases and answers/}
-name=${2:?case, for example null-1}
-work=${3:?folder for the results}
-bin=${4:-build/bin}
-case=$data/$name
-
-# tool NAME ARGUMENTS…: exit code 1 (written, a target was not met) does not stop the run.
-tool() { "$bin/supine-$1" "${@:2}" --force --quiet 2>>"$work/messages.txt" || [ $? -eq 1 ]; }
-
-mkdir -p "$work"
-: >"$work/messages.txt"
-tool segment "$case" -o "$work/labels.vti"
-tool reconstruct "$work/labels.vti" -o "$work"
-breast=$(jq -r .parameters.Eb "$data/answers/$name.json") skin=$(jq -r .parameters.Es "$data/answers/$name.json")
-sed "/^\[breast\]/,/^\[skin\]/s/value = [0-9.]*/value = $breast/; /^\[skin\]/,/^\[interface\]/s/value = [0-9.]*/value = $skin/" \
-  "$case/model.toml" >"$work/truth.toml"
+source "$(dirname "$0")/mesh_common.sh"
 
 # solve LABEL TRIANGLES MAX_DISTANCE_MM OPTIONS…: meshes, solves, compares; one line.
 poses=()
@@ -29,17 +13,16 @@ solve() {
   mkdir -p "$out"
   tool decimate "$work/breast.vtp" --triangles "$triangles" --max-distance-mm "$distance" -o "$out/coarse.vtp"
   tool tetrahedralise "$out/coarse.vtp" "$work/muscle.vtp" "$work/labels.vti" -o "$out/mesh.vtu" "${@:4}"
-  local before after
-  before=$(times | tail -1 | awk '{split($1, t, /[ms]/); print 60 * t[1] + t[2]}')
-  if ! tool simulate "$case" "$out/mesh.vtu" --model "$work/truth.toml" --pose supine --threads 1 -o "$out"; then
+  TIMEFORMAT=%U
+  if ! { time tool simulate "$case" "$out/mesh.vtu" --model "$work/truth.toml" --pose supine --threads 1 -o "$out"; } 2>"$out/user_s" ||
+    [ ! -e "$out/supine.vtu" ]; then
     printf '%-28s %7s  no result, see %s\n' "$label" "$(jq .nodes "$out/mesh.json")" "$work/messages.txt"
     return 0
   fi
-  after=$(times | tail -1 | awk '{split($1, t, /[ms]/); print 60 * t[1] + t[2]}')
   tool compare "$case" "$out/supine.vtu" -o "$out"
   poses+=("$out/supine.vtu")
   printf '%-28s %7s %8.1f %7.3f %9.2f\n' "$label" "$(jq .nodes "$out/mesh.json")" \
-    "$(awk "BEGIN {print $after - $before}")" "$(jq .rms_mm "$out/comparison.json")" \
+    "$(cat "$out/user_s")" "$(jq .rms_mm "$out/comparison.json")" \
     "$(jq '[.landmarks[].error_mm] | add / length' "$out/comparison.json")"
 }
 

@@ -60,12 +60,12 @@ Points ModelSkin::node_points() const { return distance_.points()(nodes_, Eigen:
 Points ModelSkin::node_normals() const { return distance_.normals()(nodes_, Eigen::all); }
 
 SkinAreas anatomical_areas(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy) {
-  SkinAreas areas{meshing::area_names(), Eigen::VectorXi::Constant(mesh.points.rows(), -1)};
+  SkinAreas areas{anatomy.all_area_names(), Eigen::VectorXi::Constant(mesh.points.rows(), -1)};
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
     if (!is_skin(mesh, f)) continue;
     for (const int node : mesh.faces.row(f)) {
       if (areas.of_point[node] >= 0) continue;
-      const std::string name = anatomy.area_name(anatomy.q.row(node));
+      const std::string name = anatomy.area_name_of(node);
       areas.of_point[node] =
           static_cast<int>(std::find(areas.names.begin(), areas.names.end(), name) - areas.names.begin());
     }

@@ -47,7 +47,7 @@ class ModelSkin {
   std::vector<int> nodes_;
 };
 
-/// Areas as Anatomy::area_name() gives them, from the imaged shape.
+/// Areas as Anatomy::area_name_of() gives them, from the imaged shape.
 SkinAreas anatomical_areas(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy);
 
 }  // namespace supine::calibration

@@ -32,7 +32,8 @@ Residuals residuals_of(const Scene& scene, const Prediction& prediction, const P
       residuals.place.row(row) = prediction.poses[m].scan_points.row(i);
       residuals.q.row(row).setZero();
       for (int k = 0; k < 3; ++k)
-        residuals.q.row(row) += distances.closest.weight(i, k) * scene.anatomy->q.row(distances.closest.node(i, k));
+        residuals.q.row(row) +=
+            distances.closest.weight(i, k) * scene.anatomy->chart(distances.closest.node(i, k)).transpose();
       residuals.pose[row] = static_cast<int>(m);
       residuals.point[row++] = static_cast<int>(i);
     }

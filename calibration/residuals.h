@@ -19,7 +19,7 @@ struct Residuals {
   Eigen::VectorXd distance_mm;  ///< #R, > 0 where the scan lies outside the model
   Eigen::VectorXd sigma_mm;     ///< #R, of the scanner along the normal
   Points place;                 ///< #R by 3, the scan points
-  Table q;                      ///< #R by 2, anatomy coordinates of the closest skin point
+  Table q;                      ///< #R by 2, anatomy coordinates (Anatomy::chart) of the closest skin point
   Eigen::VectorXi pose;         ///< #R, row of Scene::measurements
   Eigen::VectorXi point;        ///< #R, row of its scan
 

@@ -57,10 +57,4 @@ void RunJournal::add(const Eigen::VectorXd& values, const RunResult& result) {
   if (stream_.is_open()) stream_ << line_of(listed(values), result) << std::flush;
 }
 
-void RunJournal::discard() {
-  stream_.close();
-  std::error_code none;
-  if (!file_.empty()) std::filesystem::remove(file_, none);
-}
-
 }  // namespace supine::calibration

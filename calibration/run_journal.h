@@ -34,8 +34,8 @@ class RunJournal {
   /// Threads may call it at the same time.
   void add(const Eigen::VectorXd& values, const RunResult& result);
   std::size_t known() const { return runs_.size(); }
-  /// Removes the file: the work is finished.
-  void discard();
+  /// To be removed once the work's results are safe.
+  const std::filesystem::path& file() const { return file_; }
 
  private:
   void read(const std::string& key);

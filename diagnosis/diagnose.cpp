@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "diagnosis/chi_squared.h"
+#include "simulation/parameters.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -35,10 +36,51 @@ bool comes_near(const Refit& refit, const Refit& best, double misfit, const Verd
   return near ? own < (1 + rules.pose_share) * its : own < its;
 }
 
+double p_of_effect(const ScoreTable& table, const std::string& effect) {
+  for (const Score& score : table.scores)
+    if (score.effect == effect) return score.p_value;
+  return 1;
+}
+
+/// Whether the interval of some parameter leaves out its null.
+bool leaves_out_null(const Refit& refit) {
+  return std::any_of(refit.parameters.begin(), refit.parameters.end(), [](const FittedParameter& p) {
+    const simulation::Parameter* row = simulation::find_parameter(p.name);
+    return row != nullptr && (p.low > row->null || p.high < row->null);
+  });
+}
+
 double p_of(const ScoreTable& table) {
   double p = 1;
   for (const Score& score : table.scores) p = std::min(p, score.p_value);
   return p;
+}
+
+/// Whether the p of the effect is proof enough: held-out blocks of skin cannot show what lies under one block alone.
+bool is_sure(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
+  if (refit.bic < rules.bic || p_of_effect(table, refit.effect) > rules.sure_p || !leaves_out_null(refit)) return false;
+  const bool poses = !refit.pose_rms_mm.empty() && refit.pose_rms_mm.size() == base.pose_rms_mm.size();
+  return !poses || pose_rms(refit.pose_rms_mm) <= (1 + rules.pose_rise) * pose_rms(base.pose_rms_mm);
+}
+
+/// What counts, best first, and what comes near the best of it whether it would count by itself or not.
+std::vector<const Refit*> counting(const ScoreTable& table, const std::vector<Refit>& refits,
+                                   const std::vector<LackOfFit>& left, const BaseFigures& base,
+                                   const VerdictRules& rules) {
+  const auto counts = [&](const Refit& refit) {
+    return refit.finished && refit.bic > 0 &&
+           (improves(refit.held_out_rms_mm, base, rules) || is_sure(refit, table, base, rules));
+  };
+  std::vector<const Refit*> good;
+  const Refit* best = nullptr;
+  double misfit = 1;
+  for (std::size_t r = 0; r < refits.size(); ++r) {
+    const Refit& refit = refits[r];
+    if (best == nullptr && counts(refit)) best = &refit, misfit = left[r].misfit;
+    const bool near = best != nullptr && refit.finished && refit.bic > 0 && comes_near(refit, *best, misfit, rules);
+    if (&refit == best || (best != nullptr && counts(refit)) || near) good.push_back(&refit);
+  }
+  return good;
 }
 
 /// Polynomials in q up to degree 6, of the points of one pose each.
@@ -108,9 +150,7 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
         fmt::format("errors of scan, registration and mesh alone score as high as the best effect (p {:.3f})", p);
     return result;
   }
-  std::vector<const Refit*> good;
-  for (const Refit& refit : refits)
-    if (refit.finished && refit.bic > 0 && improves(refit.held_out_rms_mm, base, rules)) good.push_back(&refit);
+  const std::vector<const Refit*> good = counting(table, refits, left, base, rules);
   if (good.empty()) {
     result.why = "no effect of the catalogue lowers the held-out error";
     if (!refits.empty() && refits.front().finished && refits.front().bic > rules.bic)
@@ -134,6 +174,9 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
   std::stable_partition(result.missing.begin(), result.missing.end(), is_measurement_effect);
   result.verdict = result.missing.size() == 1 ? Verdict::missing : Verdict::ambiguous;
   result.why = result.verdict == Verdict::missing ? "no other effect comes near" : "these do equally well";
+  if (!improves(best.held_out_rms_mm, base, rules))
+    result.why +=
+        fmt::format("; named by its p ({:.3f}), the held-out error does not show it", p_of_effect(table, best.effect));
   return result;
 }
 

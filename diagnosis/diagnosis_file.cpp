@@ -4,53 +4,32 @@
 #include <fmt/format.h>
 #include <vtkCellArray.h>
 #include <vtkDoubleArray.h>
-#include <vtkFieldData.h>
-#include <vtkIntArray.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
-#include <vtkStringArray.h>
-#include <vtkXMLPolyDataWriter.h>
 
-#include <fstream>
-
-#include "common/error.h"
+#include "calibration/polydata_file.h"
 
 namespace supine::diagnosis {
+using calibration::add_integers;
+using calibration::add_numbers;
+using calibration::add_strings;
+
 namespace {
 
-void add_numbers(vtkPolyData* to, const std::string& name, const Eigen::VectorXd& values) {
+void add_vectors(vtkPolyData& to, const std::string& name, const Points& vectors) {
   vtkNew<vtkDoubleArray> array;
   array->SetName(name.c_str());
-  for (const double value : values) array->InsertNextValue(value);
-  to->GetPointData()->AddArray(array);
-}
-
-void add_strings(vtkPolyData* to, const char* name, const std::vector<std::string>& values) {
-  vtkNew<vtkStringArray> array;
-  array->SetName(name);
-  for (const std::string& value : values) array->InsertNextValue(value);
-  to->GetFieldData()->AddArray(array);
-}
-
-void write(vtkPolyData* poly, const std::filesystem::path& file) {
-  add_strings(poly, "frame", {"LPS"});
-  add_strings(poly, "unit", {"mm"});
-  bool written = std::ofstream(file).is_open();  // VTK would print its own complaint
-  if (written) {
-    vtkNew<vtkXMLPolyDataWriter> writer;
-    writer->SetFileName(file.c_str());
-    writer->SetInputData(poly);
-    written = writer->Write() == 1 && writer->GetErrorCode() == 0;
-  }
-  if (!written) throw InputError(fmt::format("{}: cannot be written (disk full, or no permission?)", file.string()));
+  array->SetNumberOfComponents(3);
+  for (const auto& v : vectors.rowwise()) array->InsertNextTuple3(v.x(), v.y(), v.z());
+  to.GetPointData()->AddArray(array);
 }
 
 }  // namespace
 
 void write_diagnosis(const calibration::Residuals& residuals, const std::vector<std::string>& poses,
-                     const std::vector<std::pair<std::string, Eigen::VectorXd>>& shapes,
+                     const std::vector<std::pair<std::string, Eigen::VectorXd>>& shapes, const ForceMap* forces,
                      const std::filesystem::path& file) {
   vtkNew<vtkPolyData> poly;
   vtkNew<vtkPoints> places;
@@ -62,15 +41,20 @@ void write_diagnosis(const calibration::Residuals& residuals, const std::vector<
   }
   poly->SetPoints(places);
   poly->SetVerts(cells);
-  add_numbers(poly, "distance_mm", residuals.distance_mm);
+  add_numbers(*poly, "distance_mm", residuals.distance_mm);
   poly->GetPointData()->SetActiveScalars("distance_mm");
-  vtkNew<vtkIntArray> pose;
-  pose->SetName("pose");
-  for (const int row : residuals.pose) pose->InsertNextValue(row);
-  poly->GetPointData()->AddArray(pose);
-  for (const auto& [effect, shape] : shapes) add_numbers(poly, "shape_" + effect + "_mm", shape);
-  add_strings(poly, "poses", poses);
-  write(poly, file);
+  add_integers(*poly, "pose", {residuals.pose.begin(), residuals.pose.end()});
+  for (const auto& [effect, shape] : shapes) add_numbers(*poly, "shape_" + effect + "_mm", shape);
+  if (forces != nullptr) {
+    add_vectors(*poly, "missing_force_kpa", forces->force_kpa);
+    add_vectors(*poly, "missing_force_null_kpa", forces->null_kpa);
+    add_strings(*poly, "missing_force_threshold_kpa", {fmt::format("{:.6g}", forces->threshold_kpa)});
+    add_strings(*poly, "missing_force_meaning",
+                {"a hint, no diagnosis: forces on the skin that would explain what is left; below the threshold they "
+                 "mean nothing"});
+  }
+  add_strings(*poly, "poses", poses);
+  calibration::write_polydata(*poly, file);
 }
 
 void write_error_map(const calibration::ModelSkin& skin, const SkinError& error, const calibration::SkinAreas& areas,
@@ -90,17 +74,15 @@ void write_error_map(const calibration::ModelSkin& skin, const SkinError& error,
   }
   poly->SetPoints(places);
   poly->SetPolys(cells);
-  add_numbers(poly, "distance_mm", error.mean_mm(nodes));
+  add_numbers(*poly, "distance_mm", error.mean_mm(nodes));
   poly->GetPointData()->SetActiveScalars("distance_mm");
-  add_numbers(poly, "standard_error_mm", error.error_mm(nodes));
+  add_numbers(*poly, "standard_error_mm", error.error_mm(nodes));
   if (!areas.names.empty()) {
-    vtkNew<vtkIntArray> area;
-    area->SetName("area");
-    for (const int node : nodes) area->InsertNextValue(areas.of_point[node]);
-    poly->GetPointData()->AddArray(area);
-    add_strings(poly, "area_names", areas.names);
+    const Eigen::VectorXi area = areas.of_point(nodes);
+    add_integers(*poly, "area", {area.begin(), area.end()});
+    add_strings(*poly, "area_names", areas.names);
   }
-  write(poly, file);
+  calibration::write_polydata(*poly, file);
 }
 
 }  // namespace supine::diagnosis

@@ -24,7 +24,8 @@ ErrorBudget error_budget(const WeightedFit& fit, const ErrorSources& sources, co
   double noise = mean_square(sources.noise_mm), registration = 0, numerical = std::pow(sources.spread_mm, 2);
   numerical += mean_square(left_of(sources.mean_mm, slope));
   for (const ErrorMode& mode : sources.modes)
-    (mode.source == "numerical" ? numerical : registration) += mean_square(left_of(mode.shape_mm, slope));
+    (mode.source == "numerical" || mode.source == "mesh" ? numerical : registration) +=
+        mean_square(left_of(mode.shape_mm, slope));
   const Eigen::MatrixXd white = metric.whitening->apply(slope);
   const Eigen::MatrixXd covariance = (white.transpose() * white).completeOrthogonalDecomposition().pseudoInverse();
   double parameters = (slope * covariance).cwiseProduct(slope).sum() / static_cast<double>(slope.rows());

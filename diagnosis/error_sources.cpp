@@ -41,23 +41,30 @@ std::string source_of(const std::string& effect) {
 
 }  // namespace
 
+void set_numerical(const NumericalError& numerical, const Tolerances& tolerances, ErrorSources& sources) {
+  std::erase_if(sources.modes, [](const ErrorMode& mode) { return mode.source == "mesh"; });
+  sources.mean_mm = tolerances.correction * numerical.finer_mm;
+  sources.modes.push_back({"mesh", numerical.finer_mm});
+  sources.modes.push_back({"mesh", numerical.coarser_mm});
+  sources.spread_mm = numerical.spread_mm;
+  sources.length_mm = numerical.length_mm;
+}
+
 ErrorSources error_sources(const Residuals& residuals, const std::vector<Candidate>& candidates,
                            const NumericalError* numerical, const calibration::ErrorModel& fallback,
                            const Tolerances& tolerances) {
   ErrorSources sources;
   sources.noise_mm = noise_of(residuals);
   sources.mean_mm = Eigen::VectorXd::Zero(residuals.size());
-  sources.spread_mm = numerical != nullptr ? numerical->spread_mm : fallback.spread_mm;
-  sources.length_mm = numerical != nullptr ? numerical->length_mm : fallback.length_mm;
+  sources.spread_mm = fallback.spread_mm;
+  sources.length_mm = fallback.length_mm;
   for (const Candidate& candidate : candidates) {
     const std::string source = source_of(candidate.effect);
     for (std::size_t k = 0; !source.empty() && k < candidate.parameters.size(); ++k)
       sources.modes.push_back({source, tolerance_of(candidate.parameters[k], candidate.effect, tolerances) *
                                            candidate.slope.col(static_cast<Eigen::Index>(k))});
   }
-  if (numerical == nullptr) return sources;
-  sources.mean_mm = tolerances.correction * numerical->finer_mm;
-  sources.modes.push_back({"numerical", numerical->finer_mm});
+  if (numerical != nullptr) set_numerical(*numerical, tolerances, sources);
   return sources;
 }
 

@@ -17,12 +17,13 @@ struct Tolerances {
   double registration_rad = 0.0036;  ///< turn of the scan: 0.3 mm at 80 mm
   double segmentation_mm = 0.3;      ///< offset of the imaged skin: a fifth of a 1.5 mm voxel
   double incompressibility = 0.25;   ///< of the catalogue's a: linear tetrahedra lock, and ν itself is assumed
-  double correction = 1;             ///< of the finer mesh's change is added to the distances, give or take the same
+  double effect_form = 0.07;  ///< of the size of a tissue effect: where it ends and how it mixes are the catalogue's
+  double correction = 1;      ///< of the finer mesh's change is added to the distances, give or take the same
 };
 
 /// A shape the distances may take although nothing is missing, as large as one standard deviation.
 struct ErrorMode {
-  std::string source;  ///< registration, segmentation, numerical
+  std::string source;  ///< registration, segmentation, numerical (incompressibility), mesh
   Eigen::VectorXd shape_mm;
 };
 
@@ -34,6 +35,9 @@ struct ErrorSources {
   std::vector<ErrorMode> modes;
   double spread_mm = 0, length_mm = 1;  ///< what the mesh does beyond its modes; 0 = nothing
 };
+
+/// Puts what the mesh does into the sources: mean, modes (one per other mesh), spread.
+void set_numerical(const NumericalError& numerical, const Tolerances& tolerances, ErrorSources& sources);
 
 /// @param numerical  nullptr: no mesh was tried; then spread and length are those of @p fallback, fitted to the
 ///   residual itself, and smooth effects count for little

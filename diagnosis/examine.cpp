@@ -7,6 +7,8 @@
 #include "calibration/held_out.h"
 #include "calibration/uncertainty.h"
 #include "common/error.h"
+#include "diagnosis/intervals.h"
+#include "diagnosis/secants.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -64,26 +66,32 @@ void judge_base(const RefitProblem& problem, Findings& found) {
   const calibration::Fit& fit = found.base.fit;
   BaseFigures& f = found.figures;
   f.rms_mm = rms(fit.residuals.distance_mm);
-  f.held_out_rms_mm =
-      rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, Eigen::VectorXd::Zero(fit.u.size()),
-                                          calibration::spatial_blocks(fit.residuals)));
+  f.held_out_rms_mm = rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope,
+                                                          prior_information(calibration::FreeParameters(found.model)),
+                                                          calibration::spatial_blocks(fit.residuals)));
   f.noise_mm = rms(found.sources.noise_mm);
   f.left = lack_of_fit(found.base, found.metric);
   f.pose_rms_mm = unfitted_rms_mm(problem, found.model);
 }
 
+/// Sizes and intervals of what is named, with the mesh's error measured again where it is in the model.
+void settle_named(const Subject& subject, const ExamineOptions& options, Findings& found) {
+  constexpr std::size_t most = 3;
+  const auto& names = found.diagnosis.missing;
+  if (found.diagnosis.verdict == Verdict::nothing_missing) return;
+  for (std::size_t n = 0; n < std::min(most, names.size()); ++n)
+    for (Refit& refit : found.refits)
+      if (refit.effect == names[n] && refit.finished) {
+        tell(options, "interval of " + refit.effect);
+        settle(subject.fitted, found.sources, found.numerical.has_value(), options.tolerances, found.metric, refit);
+      }
+}
+
 }  // namespace
 
-std::vector<std::string> worth_refitting(const ScoreTable& table, const std::vector<Candidate>& candidates,
-                                         const std::vector<double>& secants, std::size_t count) {
+std::vector<std::string> worth_refitting(const ScoreTable& table, std::size_t count) {
   std::vector<std::pair<double, std::string>> ranked;
-  for (std::size_t c = 0; c < candidates.size(); ++c)
-    for (const Score& score : table.scores) {
-      if (score.effect != candidates[c].effect) continue;
-      const bool secant = !secants.empty() && std::isfinite(secants[c]);
-      const double statistic = std::max(score.statistic, secant ? secants[c] : 0.0);
-      ranked.emplace_back(statistic - 2 * score.freedom, score.effect);
-    }
+  for (const Score& score : table.scores) ranked.emplace_back(score.statistic - 2 * score.freedom, score.effect);
   std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<std::string> effects;
   for (const auto& [statistic, effect] : ranked)
@@ -92,32 +100,42 @@ std::vector<std::string> worth_refitting(const ScoreTable& table, const std::vec
   return effects;
 }
 
+RefitProblem refit_problem(const Subject& subject, const Findings& found,
+                           const std::function<void(const std::string&)>& progress) {
+  return {subject.fitted, subject.whole, &found.model,
+          &found.base,    &found.metric, std::log(found.whitening.effective_points()),
+          progress};
+}
+
 std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& options) {
   auto found = std::make_unique<Findings>();
   calibration::Evaluator evaluator(subject.fitted, subject.model);
   fit_base(subject, evaluator, options, *found);
   calibration::Residuals corrected = found->base.fit.residuals;
   corrected.distance_mm += found->sources.mean_mm;
+  const RefitProblem problem = refit_problem(subject, *found, options.progress);
+  if (options.refits > 0) {
+    tell(options, "effects at their usual size");
+    find_secants(problem, found->candidates);
+  }
   tell(options, "scores");
   found->table = score_candidates(corrected, found->base.fit.linearisation.slope, found->candidates, found->whitening,
                                   options.seed);
-  RefitProblem problem{subject.fitted,  subject.whole,  &found->model,
-                       &found->base,    &found->metric, std::log(found->whitening.effective_points()),
-                       options.progress};
   judge_base(problem, *found);
   const bool silent = !found->table.scores.empty() && found->table.scores.front().p_value >= options.rules.p_value &&
                       found->figures.left.p_value >= options.rules.lack_of_fit_p;
-  if (!silent && options.refits > 0) {
-    tell(options, "effects at their usual size");
-    found->secants = secant_statistics(problem, found->candidates);
-    found->refits = refit_candidates(
-        problem, found->candidates, found->table,
-        worth_refitting(found->table, found->candidates, found->secants, static_cast<std::size_t>(options.refits)));
-  }
+  if (!silent && options.refits > 0)
+    found->refits = refit_candidates(problem, found->candidates, found->table,
+                                     worth_refitting(found->table, static_cast<std::size_t>(options.refits)));
   for (const Refit& refit : found->refits)
     found->left.push_back(refit.solved ? lack_of_fit(refit.fit, found->metric) : LackOfFit{});
   found->budget = error_budget(found->base, found->sources, found->metric);
   found->diagnosis = decide(found->table, found->refits, found->left, found->figures, options.rules);
+  settle_named(subject, options, *found);
+  if (found->diagnosis.verdict == Verdict::unexplained) {
+    tell(options, "map of missing forces");
+    found->forces = force_map(subject.fitted, found->model, found->base, found->metric, options.seed);
+  }
   return found;
 }
 

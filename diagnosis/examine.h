@@ -9,6 +9,7 @@
 
 #include "diagnosis/diagnose.h"
 #include "diagnosis/error_budget.h"
+#include "diagnosis/force_map.h"
 
 namespace supine::diagnosis {
 
@@ -43,12 +44,12 @@ struct Findings {
   std::vector<Candidate> candidates;
   std::vector<std::string> unseen;  ///< effects that move no fitted point, here or anywhere
   ScoreTable table;
-  std::vector<double> secants;  ///< per candidate (refit.h); empty where nothing was refitted
   std::vector<Refit> refits;    ///< best first
   std::vector<LackOfFit> left;  ///< per refit
   BaseFigures figures;
   ErrorBudget budget;
   Diagnosis diagnosis;
+  std::optional<ForceMap> forces;  ///< that would explain what is left; only when unexplained
 
   Findings() = default;
   Findings(const Findings&) = delete;
@@ -60,10 +61,11 @@ struct Findings {
 /// @throws NumericalFailure  no equilibrium of the model as given
 std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& options);
 
-/// Effects worth a refit: the @p count with the largest statistic, by slope or by secant, that are within reach of the
-/// best.
-/// @param secants  per candidate, NaN where there is none
-std::vector<std::string> worth_refitting(const ScoreTable& table, const std::vector<Candidate>& candidates,
-                                         const std::vector<double>& secants, std::size_t count);
+/// What refits of the findings' candidates start from. Points into both.
+RefitProblem refit_problem(const Subject& subject, const Findings& found,
+                           const std::function<void(const std::string&)>& progress);
+
+/// Effects worth a refit: the @p count with the largest statistic that are within reach of the best.
+std::vector<std::string> worth_refitting(const ScoreTable& table, std::size_t count);
 
 }  // namespace supine::diagnosis

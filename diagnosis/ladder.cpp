@@ -10,28 +10,38 @@
 namespace supine::diagnosis {
 namespace {
 
-Rung rung_of(const Findings& found, const std::string& added) {
-  const double p = found.table.scores.empty() ? 1 : found.table.scores.front().p_value;
-  return {added,
-          found.base.fit.residuals.distance_mm.cwiseAbs().mean(),
-          found.figures.rms_mm,
-          found.figures.held_out_rms_mm,
-          found.figures.pose_rms_mm,
-          p};
+RungFigures figures_of(const Findings& found, const std::string& added) {
+  return {added, found.base.fit.residuals.distance_mm.cwiseAbs().mean(), found.figures.rms_mm,
+          found.figures.held_out_rms_mm, found.figures.pose_rms_mm};
 }
 
-/// One of the refits that were not chosen.
-Rung random_other(const Findings& found, unsigned seed) {
-  std::vector<const Refit*> others;
+Rung rung_of(const Findings& found, const std::string& added) {
+  const double p = found.table.scores.empty() ? 1 : found.table.scores.front().p_value;
+  return {figures_of(found, added), p, {}, {}, found.model};
+}
+
+RungFigures figures_of(const Refit& refit) {
+  return {refit.effect, refit.fit.fit.residuals.distance_mm.cwiseAbs().mean(), refit.rms_mm, refit.held_out_rms_mm,
+          refit.pose_rms_mm};
+}
+
+/// Any effect but those that are blamed, drawn by the seed: one that was refitted for the verdict serves, else it is
+/// refitted here. Of those without equilibrium the next is taken.
+std::optional<RungFigures> random_other(const Subject& subject, const Findings& found, unsigned seed) {
   const auto& chosen = found.diagnosis.missing;
-  for (const Refit& refit : found.refits)
-    if (refit.solved && std::find(chosen.begin(), chosen.end(), refit.effect) == chosen.end()) others.push_back(&refit);
-  if (others.empty()) return {};
+  std::vector<std::string> others;
+  for (const Candidate& candidate : found.candidates)
+    if (std::find(chosen.begin(), chosen.end(), candidate.effect) == chosen.end()) others.push_back(candidate.effect);
   std::mt19937 generator(seed);
-  const Refit& refit = *others[generator() % others.size()];
-  return {refit.effect,      refit.fit.fit.residuals.distance_mm.cwiseAbs().mean(),
-          refit.rms_mm,      refit.held_out_rms_mm,
-          refit.pose_rms_mm, 1};
+  std::shuffle(others.begin(), others.end(), generator);
+  const RefitProblem problem = refit_problem(subject, found, {});
+  for (const std::string& effect : others) {
+    for (const Refit& refit : found.refits)
+      if (refit.effect == effect && refit.finished) return figures_of(refit);
+    const auto refits = refit_candidates(problem, found.candidates, found.table, {effect});
+    if (!refits.empty() && refits[0].solved) return figures_of(refits[0]);
+  }
+  return {};
 }
 
 const Refit* chosen_refit(const Findings& found) {
@@ -46,9 +56,9 @@ const Refit* chosen_refit(const Findings& found) {
 Ladder climb(const Subject& subject, const ExamineOptions& options, const Findings& first, int most) {
   Ladder ladder;
   ladder.rungs.push_back(rung_of(first, {}));
-  ladder.random_other = random_other(first, options.seed);
   ladder.verdict = first.diagnosis.verdict;
   ladder.missing = first.diagnosis.missing;
+  ladder.last = first.diagnosis;
   ladder.noise_floor_mm = std::hypot(first.figures.noise_mm, first.sources.spread_mm);
   ladder.model = first.model;
   std::unique_ptr<Findings> next;
@@ -64,7 +74,11 @@ Ladder climb(const Subject& subject, const ExamineOptions& options, const Findin
     with.near = &refit->fit.fit.prediction.solution;
     try {
       std::unique_ptr<Findings> after = examine(with, options);
-      ladder.rungs.push_back(rung_of(*after, added));
+      Rung rung = rung_of(*after, added);
+      rung.refit_only = figures_of(*found, ladder.rungs.back().added);
+      rung.random_other = random_other(subject, *found, options.seed + static_cast<unsigned>(ladder.rungs.size()));
+      ladder.rungs.push_back(std::move(rung));
+      ladder.last = after->diagnosis;
       ladder.model = after->model;
       next = std::move(after);
     } catch (const NumericalFailure& failure) {

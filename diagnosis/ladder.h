@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,22 +11,29 @@
 
 namespace supine::diagnosis {
 
-/// A model on the ladder, fitted under all errors.
-struct Rung {
+/// How well one fitted model does.
+struct RungFigures {
   std::string added;  ///< effect added last; empty for the base model
   double mae_mm, rms_mm, held_out_rms_mm;
   std::vector<double> held_out_pose_rms_mm;
-  double p_value;  ///< of the best effect that could still be added
+};
+
+/// A model on the ladder, fitted under all errors, beside what could have been done instead.
+struct Rung : RungFigures {
+  double p_value = 1;  ///< of the best effect that could still be added
+  /// Controls of a rung that added something: nothing added and everything free fitted again (the rung before); and an
+  /// effect drawn by the seed from all others that this model could have, fitted. Its effect is empty where none had an
+  /// equilibrium.
+  std::optional<RungFigures> refit_only, random_other;
+  simulation::Model model;  ///< as fitted
 };
 
 struct Ladder {
-  std::vector<Rung> rungs;  ///< the first is the control "refit only": the base model, everything free fitted again
-  /// The control "a random other effect": one of the refits of the first rung that was not chosen, drawn by the seed;
-  /// empty effect where there was none.
-  Rung random_other;
+  std::vector<Rung> rungs;                     ///< the first is the base model, everything free fitted again
   std::string stopped;                         ///< why
   Verdict verdict = Verdict::nothing_missing;  ///< of the first rung
   std::vector<std::string> missing;            ///< of the first rung
+  Diagnosis last;                              ///< of the last rung
   double noise_floor_mm = 0;                   ///< what noise and mesh alone would leave
   simulation::Model model;                     ///< of the last rung
 };

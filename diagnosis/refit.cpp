@@ -4,7 +4,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 
@@ -108,21 +107,19 @@ void finish(const RefitProblem& problem, Job& job) {
   job.finished = true;
 }
 
-std::vector<FittedParameter> fitted_parameters(const RefitProblem& problem, const Job& job) {
-  constexpr double quantile = 1.959964;
-  const FreeParameters& parameters = *job.parameters;
+/// What the data say of place and shape beyond the prior costs, as in Laplace's evidence.
+double occam(const Job& job, const Metric& metric) {
+  const auto& priors = job.parameters->priors();
+  const auto shape = [&job, &priors](Eigen::Index i) {
+    const auto k = static_cast<std::size_t>(i);
+    return priors[k] && job.parameters->names()[k].rfind(job.effect + ".", 0) == 0;
+  };
   const Eigen::MatrixXd covariance =
-      information(job.fit, parameters, *problem.metric).completeOrthogonalDecomposition().pseudoInverse();
-  std::vector<FittedParameter> list;
-  for (Eigen::Index i = 0; i < parameters.size(); ++i) {
-    const std::string& name = parameters.names()[static_cast<std::size_t>(i)];
-    if (name.rfind(job.effect + ".", 0) != 0) continue;
-    const double reach = quantile * std::sqrt(covariance(i, i)), u = job.fit.fit.u[i];
-    list.push_back({name, parameters.unit(i), parameters.value(i, u),
-                    parameters.value(i, std::max(u - reach, parameters.lower()[i])),
-                    parameters.value(i, std::min(u + reach, parameters.upper()[i]))});
-  }
-  return list;
+      information(job.fit, *job.parameters, metric).completeOrthogonalDecomposition().pseudoInverse();
+  double sum = 0;
+  for (Eigen::Index i = 0; i < job.parameters->size(); ++i)
+    if (shape(i)) sum += std::log(std::pow(priors[static_cast<std::size_t>(i)]->sd, 2) / covariance(i, i));
+  return std::max(0.0, sum);
 }
 
 Refit summary(const RefitProblem& problem, Job& job) {
@@ -131,12 +128,12 @@ Refit summary(const RefitProblem& problem, Job& job) {
   if (!job.solved) return refit;
   const calibration::Fit& fit = job.fit.fit;
   refit.gain = problem.base->objective - job.fit.objective;
-  refit.bic = refit.gain - refit.freedom * problem.log_points;
+  refit.bic = refit.gain - refit.freedom * problem.log_points - occam(job, *problem.metric);
   refit.rms_mm = rms(fit.residuals.distance_mm);
-  refit.held_out_rms_mm = rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope,
-                                                              Eigen::VectorXd::Zero(job.parameters->size()),
-                                                              calibration::spatial_blocks(fit.residuals)));
-  refit.parameters = fitted_parameters(problem, job);
+  refit.held_out_rms_mm =
+      rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, prior_information(*job.parameters),
+                                          calibration::spatial_blocks(fit.residuals)));
+  refit.parameters = linear_intervals(job.effect, job.fit, *job.parameters, *problem.metric);
   refit.model = job.parameters->model(fit.u);
   if (job.finished) refit.pose_rms_mm = unfitted_rms_mm(problem, refit.model);
   refit.fit = std::move(job.fit);
@@ -159,12 +156,37 @@ simulation::EffectSetting free_setting(const std::string& name) {
   const simulation::Effect& effect = *simulation::find_effect(name);
   simulation::EffectSetting setting = simulation::null_setting(effect);
   for (const Parameter& row : effect.parameters()) {
-    if (is_strength(effect, row))
-      setting.parameters[row.name] = {row.median, true, {}, row.lower, row.upper};
-    else
-      setting.parameters[row.name].value = row.median;
+    const double spread = row.one_sided ? row.median * std::expm1(row.log_sd) : row.log_sd;
+    setting.parameters[row.name] = {row.median, true, {}, row.lower, row.upper};
+    if (!is_strength(effect, row)) setting.parameters[row.name].prior_sd = spread;
   }
   return setting;
+}
+
+std::vector<FittedParameter> linear_intervals(const std::string& effect, const WeightedFit& fit,
+                                              const FreeParameters& parameters, const Metric& metric) {
+  constexpr double quantile = 1.959964;
+  const Eigen::MatrixXd covariance =
+      information(fit, parameters, metric).completeOrthogonalDecomposition().pseudoInverse();
+  const double wider = std::sqrt(std::max(1.0, misfit_of(fit, parameters, metric)));
+  std::vector<FittedParameter> list;
+  for (Eigen::Index i = 0; i < parameters.size(); ++i) {
+    const std::string& name = parameters.names()[static_cast<std::size_t>(i)];
+    if (name.rfind(effect + ".", 0) != 0) continue;
+    const double reach = wider * quantile * std::sqrt(covariance(i, i)), u = fit.fit.u[i];
+    list.push_back({name, parameters.unit(i), parameters.value(i, u),
+                    parameters.value(i, std::max(u - reach, parameters.lower()[i])),
+                    parameters.value(i, std::min(u + reach, parameters.upper()[i]))});
+  }
+  return list;
+}
+
+Eigen::VectorXd prior_information(const FreeParameters& parameters) {
+  Eigen::VectorXd information = Eigen::VectorXd::Zero(parameters.size());
+  for (Eigen::Index i = 0; i < information.size(); ++i)
+    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(i)])
+      information[i] = 1 / (prior->sd * prior->sd);
+  return information;
 }
 
 std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model) {
@@ -186,39 +208,6 @@ std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulatio
     all.clear();  // that pose has no equilibrium: it says nothing
   }
   return all;
-}
-
-std::vector<double> secant_statistics(const RefitProblem& problem, const std::vector<Candidate>& candidates) {
-  std::vector<double> statistics(candidates.size(), std::numeric_limits<double>::quiet_NaN());
-  const Whitening& whitening = *problem.metric->whitening;
-  const calibration::Fit& base = problem.base->fit;
-  const Eigen::MatrixXd absorbed = whitening.apply(base.linearisation.slope);
-  const auto solver = absorbed.completeOrthogonalDecomposition();
-  const auto freed = [&](const Eigen::VectorXd& d) -> Eigen::VectorXd {
-    const Eigen::VectorXd white = whitening.apply(d);
-    return white - absorbed * solver.solve(white);
-  };
-  const Eigen::VectorXd left = freed(base.residuals.distance_mm + problem.metric->mean_mm);
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t c = 0; c < candidates.size(); ++c) {
-    const auto& rows = candidates[c].parameters;
-    simulation::EffectSetting setting = free_setting(candidates[c].effect);
-    const Parameter* row = simulation::find_parameter(rows[0].name);
-    if (rows.size() != 1 || row->median == row->null) continue;
-    simulation::Model model = *problem.model;
-    model.effects.push_back(setting);
-    try {
-      calibration::Evaluator evaluator(problem.scene, model);
-      const calibration::Prediction moved = evaluator.predict(model, &base.prediction.solution);
-      const auto there = calibration::residuals_of(problem.scene, moved, base.mask, problem.metric->noise_mm);
-      const Eigen::VectorXd change = freed(there.distance_mm - base.residuals.distance_mm);
-      const double along = -change.dot(left);
-      if (along > 0 || !rows[0].one_sided) statistics[c] = along * along / change.squaredNorm();
-    } catch (const NumericalFailure&) {
-      // No equilibrium at the usual size: the slope at the null has to do.
-    }
-  }
-  return statistics;
 }
 
 std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vector<Candidate>& candidates,

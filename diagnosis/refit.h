@@ -23,7 +23,7 @@ struct Refit {
   bool finished = false;  ///< whether it was followed to the end, or given up early as hopeless
   int freedom = 0;        ///< parameters of the effect
   double gain = 0;        ///< fall of F from the base model's
-  double bic = 0;         ///< gain − freedom · ln n
+  double bic = 0;         ///< gain − freedom · ln n − Σ ln(prior variance / variance) over its place and shape
   double rms_mm = 0, held_out_rms_mm = 0;   ///< fitted points; every block of skin without itself
   std::vector<double> pose_rms_mm;          ///< of every pose that was not fitted
   std::vector<FittedParameter> parameters;  ///< of the effect
@@ -32,7 +32,7 @@ struct Refit {
 };
 
 /// The effect with its strength free and without a prior, because how large it usually is shall not decide whether it
-/// is there; its place and shape fixed at the catalogue's.
+/// is there; its place and shape free with the catalogue's spread, because nobody knows them.
 simulation::EffectSetting free_setting(const std::string& effect);
 
 /// What all refits start from.
@@ -46,15 +46,18 @@ struct RefitProblem {
   std::function<void(const std::string&)> progress;  ///< may be empty; called by any thread, one at a time
 };
 
-/// By how much F would fall if the change that the effect makes at its usual size were scaled freely and the base model
-/// fitted again: for each candidate of one parameter whose usual size is not its null, else NaN. What acts far from
-/// linearly (ligament, adhesion) shows itself here where the slope at the null points elsewhere. One solve each.
-std::vector<double> secant_statistics(const RefitProblem& problem, const std::vector<Candidate>& candidates);
-
 /// Refits candidates side by side: each from the catalogue's usual size and from its one-step size, whichever starts
 /// better; three steps for all, to the end for those whose F comes within reach of the best.
 std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vector<Candidate>& candidates,
                                     const ScoreTable& table, const std::vector<std::string>& which);
+
+/// Intervals of the effect's parameters from the information under Σ and the priors, 1.96 standard deviations times
+/// √max(1, misfit) to each side, cut at the range.
+std::vector<FittedParameter> linear_intervals(const std::string& effect, const WeightedFit& fit,
+                                              const calibration::FreeParameters& parameters, const Metric& metric);
+
+/// Information of the priors, 0 where there is none.
+Eigen::VectorXd prior_information(const calibration::FreeParameters& parameters);
 
 /// Root mean square distance of each pose that is not fitted.
 std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model);

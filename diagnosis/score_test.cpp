@@ -31,6 +31,7 @@ Eigen::MatrixXd basis(const Eigen::MatrixXd& columns) {
 struct Projected {
   Eigen::MatrixXd slope;      // M S̃
   Eigen::MatrixXd direction;  // orthonormal
+  Eigen::VectorXd secant;     // of length 1; empty where there is none
   bool one_sided;
 };
 
@@ -48,7 +49,8 @@ class Scorer {
     };
     distance_ = freed(whitening.apply(residuals.distance_mm));
     for (const Candidate& candidate : candidates) {
-      Projected p{freed(whitening.apply(candidate.slope)), {}, false};
+      Projected p{freed(whitening.apply(candidate.slope)), {}, {}, false};
+      if (candidate.secant.size() > 0) p.secant = freed(whitening.apply(candidate.secant)).normalized();
       p.direction = basis(p.slope);
       p.one_sided = candidate.parameters.size() == 1 && candidate.parameters[0].one_sided;
       projected_.push_back(std::move(p));
@@ -73,7 +75,8 @@ class Scorer {
       score.beyond_range |= std::abs(score.step[k] - parameter.null) > implausible * std::abs(range - parameter.null);
     }
     score.wrong_sign = p.one_sided && score.step[0] < candidate.parameters[0].null;
-    score.statistic = score.wrong_sign ? 0 : (p.direction.transpose() * distance_).squaredNorm();
+    score.slope_statistic = statistic_along_slope(p, distance_);
+    score.statistic = std::max(score.slope_statistic, statistic_along_secant(p, distance_));
     score.bic = score.statistic - score.freedom * log_points_;
     predict(candidate, score);
     expect(candidate, p, score);
@@ -90,8 +93,7 @@ class Scorer {
       for (double& number : z) number = normal(generator);
       best = -1e300;
       for (const Projected& p : projected_) {
-        const bool wrong = p.one_sided && p.slope.col(0).dot(z) > 0;
-        const double t = wrong ? 0 : (p.direction.transpose() * z).squaredNorm();
+        const double t = std::max(statistic_along_slope(p, z), statistic_along_secant(p, z));
         best = std::max(best, t - static_cast<double>(p.direction.cols()) * log_points_);
       }
     }
@@ -110,6 +112,17 @@ class Scorer {
   }
 
  private:
+  static double statistic_along_slope(const Projected& p, const Eigen::VectorXd& d) {
+    const bool wrong = p.one_sided && p.slope.col(0).dot(d) > 0;
+    return wrong ? 0 : (p.direction.transpose() * d).squaredNorm();
+  }
+
+  static double statistic_along_secant(const Projected& p, const Eigen::VectorXd& d) {
+    if (p.secant.size() == 0) return 0;
+    const double along = -p.secant.dot(d);
+    return p.one_sided && along < 0 ? 0 : along * along;
+  }
+
   /// Errors after the joint linear step that a calibration would make (every point counts once), the candidate's part
   /// cut at its bounds.
   void predict(const Candidate& candidate, Score& score) const {

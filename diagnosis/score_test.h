@@ -13,13 +13,16 @@ namespace supine::diagnosis {
 /// What the measurement says of one candidate, from the fitted model alone (no refit).
 struct Score {
   std::string effect;
-  double statistic;         ///< T: fall of the whitened sum of squares, recalibration allowed for
+  /// T: fall of the whitened sum of squares, recalibration allowed for, along the slope or along the secant, whichever
+  /// is more.
+  double statistic;
+  double slope_statistic;   ///< along the slope alone
   int freedom;              ///< q: directions tested
   double bic;               ///< b = T − q ln n_eff
   double p_value;           ///< that the best candidate of all scores as high as this one without any effect
   Eigen::VectorXd step;     ///< one-step value of each parameter, in its unit
   Eigen::VectorXd step_sd;  ///< its standard deviation
-  bool wrong_sign;          ///< one-sided, and the step goes to the other side: T = 0
+  bool wrong_sign;          ///< one-sided, and the step goes to the other side: nothing along the slope
   bool beyond_range;        ///< a step leaves three times the range from null to bound: right shape, implausible amount
   double predicted_rms_mm;  ///< of all points after the joint linear step, steps cut at the bounds
   double predicted_held_out_rms_mm;              ///< the same, every block of skin predicted without itself
@@ -38,8 +41,9 @@ struct ScoreTable {
 /// Projected score test (Rao's; Lagrange multiplier) of every candidate. With d̃ = L⁻¹d, S̃ = L⁻¹S and Q an orthonormal
 /// basis of what recalibration can absorb, M = I − QQᵀ:
 ///   T = ‖P(M S̃) M d̃‖²,   φ̂ = φ⁰ − (M S̃)⁺ M d̃;   T = 0 where a one-sided φ̂ is below its null.
-/// p: max over all candidates of b under d̃ ~ N(0, I), 1000 seeded draws (Westfall and Young). It is as good as Σ:
-/// with white noise it calls every mesh error an effect.
+/// A candidate with a secant is tested along both directions and counts with the better one.
+/// p: max over all candidates and directions of b under d̃ ~ N(0, I), 1000 seeded draws (Westfall and Young). It is as
+/// good as Σ: with white noise it calls every mesh error an effect.
 /// @param slope  ∂d/∂u of the fitted parameters, #R by #parameters
 ScoreTable score_candidates(const calibration::Residuals& residuals, const Eigen::MatrixXd& slope,
                             const std::vector<Candidate>& candidates, const Whitening& whitening, unsigned seed);

@@ -85,6 +85,10 @@ WeightedFit weigh(Evaluator& evaluator, const FreeParameters& parameters, const 
   return result;
 }
 
+void weigh_again(const FreeParameters& parameters, const Metric& metric, WeightedFit& fit) {
+  evaluate(rows_of(fit.fit, parameters, metric), parameters.size(), fit);
+}
+
 void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
              const DescentOptions& options, WeightedFit& fit) {
   double damping = 1e-3;
@@ -115,6 +119,11 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metri
     damping = std::max(10 * damping, 0.1);
     if (damping > 1e4) return;
   }
+}
+
+double misfit_of(const WeightedFit& fit, const FreeParameters& parameters, const Metric& metric) {
+  const auto rows = metric.whitening->apply(fit.fit.residuals.distance_mm).size();
+  return fit.data / static_cast<double>(std::max<Eigen::Index>(1, rows - parameters.size()));
 }
 
 Eigen::MatrixXd information(const WeightedFit& fit, const FreeParameters& parameters, const Metric& metric) {

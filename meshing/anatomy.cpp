@@ -10,6 +10,7 @@
 #include <set>
 
 #include "common/error.h"
+#include "meshing/cleft.h"
 #include "meshing/foot.h"
 #include "meshing/topology.h"
 #include "segmentation/tissue.h"
@@ -146,12 +147,13 @@ void set_points(Anatomy& anatomy, const TetMesh& mesh) {
 }
 
 // Skin point nearest to the centre of the nipple tissue, or else the one furthest from the muscle inside the foot.
-int find_nipple(const Anatomy& anatomy, const TetMesh& mesh) {
+// Only points of the breast itself, where `own` says which those are.
+int find_nipple(const Anatomy& anatomy, const TetMesh& mesh, const std::vector<char>& own) {
   const auto nipple = mesh.fraction.col(static_cast<int>(segmentation::Tissue::nipple));
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double volume = 0;
   for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
-    if (nipple[c] <= 0) continue;
+    if (nipple[c] <= 0 || !own[mesh.cells(c, 0)]) continue;
     const double share = nipple[c] * cell_volume_mm3(mesh.points, mesh.cells, c);
     for (int k = 0; k < 4; ++k) centre += share / 4 * mesh.points.row(mesh.cells(c, k)).transpose();
     volume += share;
@@ -162,6 +164,7 @@ int find_nipple(const Anatomy& anatomy, const TetMesh& mesh) {
     if (!is_skin(mesh.region[f])) continue;
     for (int k = 0; k < 3; ++k) {
       const int p = mesh.faces(f, k);
+      if (!own[p]) continue;
       const Eigen::Vector3d at = mesh.points.row(p).transpose();
       if (volume == 0 && anatomy.from_foot_mm(anatomy.q.row(p).transpose()) > 0) continue;
       const double score = volume > 0 ? -(at - centre / volume).norm() : anatomy.thickness_mm[p];
@@ -174,22 +177,14 @@ int find_nipple(const Anatomy& anatomy, const TetMesh& mesh) {
   return best;
 }
 
-}  // namespace
-
-Anatomy compute_anatomy(const TetMesh& mesh, const std::string& side) {
-  if (side != "left" && side != "right") {
-    throw InputError(fmt::format("side is \"{}\"; the anatomy of one breast needs left or right", side));
-  }
-  const std::vector<Piece> skin = pieces_of(mesh, is_skin, "skin"), inner = pieces_of(mesh, is_inner, "inner");
-  Eigen::Matrix<double, 2, 3> box;
-  box.row(0) = mesh.points.colwise().minCoeff();
-  box.row(1) = mesh.points.colwise().maxCoeff();
+// One breast from the pieces of skin and inner surface on its side.
+Anatomy one_breast(const TetMesh& mesh, const std::string& side, const std::shared_ptr<const MuscleDistance>& muscle,
+                   const std::vector<Piece>& skin, const std::vector<Piece>& inner, const std::vector<char>& own) {
   Anatomy anatomy;
   anatomy.side = side;
-  anatomy.muscle = std::make_shared<const MuscleDistance>(mesh.muscle, box);
+  anatomy.muscle = muscle;
   set_foot(anatomy, skin, inner);
-  for (const Piece& p : skin)
-    anatomy.mound_height_mm = std::max(anatomy.mound_height_mm, anatomy.muscle->value(p.point));
+  for (const Piece& p : skin) anatomy.mound_height_mm = std::max(anatomy.mound_height_mm, muscle->value(p.point));
   if (!(anatomy.mound_height_mm > anatomy.rim_thickness_mm + smallest_mound_mm)) {
     throw InputError(
         fmt::format("no mound stands over the muscle: the tissue is {:.1f} mm thick at most and {:.1f} mm at its rim; "
@@ -197,8 +192,69 @@ Anatomy compute_anatomy(const TetMesh& mesh, const std::string& side) {
                     anatomy.mound_height_mm, anatomy.rim_thickness_mm));
   }
   set_points(anatomy, mesh);
-  anatomy.nipple_point = find_nipple(anatomy, mesh);
+  anatomy.nipple_point = find_nipple(anatomy, mesh, own);
   return anatomy;
+}
+
+std::vector<Piece> on_side(const std::vector<Piece>& pieces, double sternum_x_mm, bool left) {
+  std::vector<Piece> own;
+  for (const Piece& p : pieces)
+    if ((p.point.x() >= sternum_x_mm) == left) own.push_back(p);
+  return own;
+}
+
+// What stands for both: q and the breast of each point, and what the two have in common.
+Anatomy joined(Anatomy left, Anatomy right, const TetMesh& mesh, double sternum_x_mm) {
+  Anatomy both = left;
+  both.side = "both";
+  both.sternum_x_mm = sternum_x_mm;
+  both.outward = (left.outward + right.outward).normalized();
+  both.foot_radius_mm = std::max(left.foot_radius_mm, right.foot_radius_mm);
+  both.rim_thickness_mm = std::max(left.rim_thickness_mm, right.rim_thickness_mm);
+  both.mound_height_mm = std::max(left.mound_height_mm, right.mound_height_mm);
+  both.nipple_point = -1;
+  both.breast.resize(mesh.points.rows());
+  for (Eigen::Index i = 0; i < mesh.points.rows(); ++i) {
+    both.breast[i] = mesh.points(i, 0) >= sternum_x_mm ? 0 : 1;
+    if (both.breast[i] == 1) both.q.row(i) = right.q.row(i);
+  }
+  both.breasts.push_back(std::move(left));
+  both.breasts.push_back(std::move(right));
+  return both;
+}
+
+Anatomy two_breasts(const TetMesh& mesh, const std::shared_ptr<const MuscleDistance>& muscle,
+                    const std::vector<Piece>& skin, const std::vector<Piece>& inner) {
+  std::vector<Eigen::Vector2d> heights;
+  for (const Piece& p : skin) heights.emplace_back(p.point.x(), muscle->value(p.point));
+  const double sternum_x_mm = find_cleft_x(heights);
+  Anatomy sides[2];
+  for (const bool left : {true, false}) {
+    std::vector<char> own(mesh.points.rows());
+    for (Eigen::Index i = 0; i < mesh.points.rows(); ++i) own[i] = (mesh.points(i, 0) >= sternum_x_mm) == left;
+    const auto own_inner = on_side(inner, sternum_x_mm, left);
+    const char* name = left ? "left" : "right";
+    if (own_inner.empty())
+      throw InputError(fmt::format("the {} breast (x {} {:.1f} mm) has no boundary triangles of region inner", name,
+                                   left ? ">=" : "<", sternum_x_mm));
+    sides[left ? 0 : 1] = one_breast(mesh, name, muscle, on_side(skin, sternum_x_mm, left), own_inner, own);
+  }
+  return joined(std::move(sides[0]), std::move(sides[1]), mesh, sternum_x_mm);
+}
+
+}  // namespace
+
+Anatomy compute_anatomy(const TetMesh& mesh, const std::string& side) {
+  if (side != "left" && side != "right" && side != "both") {
+    throw InputError(fmt::format("side is \"{}\"; the anatomy needs left, right or both", side));
+  }
+  const std::vector<Piece> skin = pieces_of(mesh, is_skin, "skin"), inner = pieces_of(mesh, is_inner, "inner");
+  Eigen::Matrix<double, 2, 3> box;
+  box.row(0) = mesh.points.colwise().minCoeff();
+  box.row(1) = mesh.points.colwise().maxCoeff();
+  const auto muscle = std::make_shared<const MuscleDistance>(mesh.muscle, box);
+  if (side == "both") return two_breasts(mesh, muscle, skin, inner);
+  return one_breast(mesh, side, muscle, skin, inner, std::vector<char>(mesh.points.rows(), 1));
 }
 
 }  // namespace supine::meshing

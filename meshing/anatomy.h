@@ -12,8 +12,12 @@
 namespace supine::meshing {
 
 /// The anatomical frame of one breast, computed once per case from the imaged (prone) mesh and the muscle.
+///
+/// With side "both", `breasts` holds the frame of each, `breast` says whose a point is, and q is that of the point's
+/// own breast: lateral is positive to the outer side of both. outward is then the mean of the two, lateral the left
+/// one's, heights and radii the larger; what belongs to one breast is asked of breast_frame().
 struct Anatomy {
-  std::string side;         ///< left or right
+  std::string side;         ///< left, right or both
   Eigen::Vector3d outward;  ///< unit; mean outward normal of the muscle under the mound
   Eigen::Vector3d lateral;  ///< unit, orthogonal to outward; toward the patient's own outer side (+x LPS for left)
   Eigen::Vector3d head;     ///< unit, orthogonal to both; toward the head
@@ -30,6 +34,21 @@ struct Anatomy {
   Eigen::VectorXd thickness_mm;  ///< #points; φ at each imaged point: height over the muscle
   int nipple_point = -1;  ///< skin point furthest from the muscle within the mound, or where the nipple tissue is
   std::shared_ptr<const MuscleDistance> muscle;
+  double sternum_x_mm = 0;       ///< side both: the plane x = sternum_x_mm (LPS) parts the two
+  std::vector<Anatomy> breasts;  ///< side both: left, right; else empty
+  Eigen::VectorXi breast;        ///< #points; row of `breasts` a point belongs to; empty for one breast
+
+  /// The frame of one breast: @p which is a row of `breasts`, or anything where there is one breast only.
+  const Anatomy& breast_frame(int which) const { return breasts.empty() ? *this : breasts[which]; }
+  /// Row of `breasts` of a point (of the mesh), 0 where there is one breast only.
+  int breast_of(Eigen::Index point) const { return breasts.empty() ? 0 : breast[point]; }
+  /// q of a point of the mesh; with two breasts on one chart of both: measured from the sternum, positive to the left,
+  /// so that no place of the one has the coordinates of a place of the other.
+  Eigen::Vector2d chart(Eigen::Index point) const;
+  /// area_name() of a point of the mesh; with two breasts "left …" or "right …".
+  std::string area_name_of(Eigen::Index point) const;
+  /// All names area_name_of() can return, in the order tables list them.
+  std::vector<std::string> all_area_names() const;
 
   /// Radius of the foot at azimuth @p theta (rad, from lateral toward head), mm.
   double foot_radius_at(double theta) const;
@@ -44,8 +63,8 @@ struct Anatomy {
 const std::vector<std::string>& area_names();
 
 /// @param mesh  imaged mesh with its muscle sheet
-/// @param side  left or right
-/// @throws InputError  no inner or no skin faces, no mound over the muscle
+/// @param side  left, right or both
+/// @throws InputError  no inner or no skin faces, no mound over the muscle; both: no cleft between two mounds
 Anatomy compute_anatomy(const TetMesh& mesh, const std::string& side);
 
 }  // namespace supine::meshing

@@ -36,6 +36,30 @@ std::string Anatomy::area_name(const Eigen::Vector2d& q_point) const {
   return std::string(from_nipple.y() > 0 ? "upper " : "lower ") + (from_nipple.x() > 0 ? "outer" : "inner");
 }
 
+Eigen::Vector2d Anatomy::chart(Eigen::Index point) const {
+  Eigen::Vector2d place = q.row(point);
+  if (breasts.empty()) return place;
+  const Anatomy& own = breast_frame(breast_of(point));
+  place.x() += std::abs(own.foot_centre_mm.x() - sternum_x_mm) / own.foot_radius_mm;
+  if (own.side == "right") place.x() = -place.x();
+  return place;
+}
+
+std::string Anatomy::area_name_of(Eigen::Index point) const {
+  const Eigen::Vector2d q_point = q.row(point);
+  if (breasts.empty()) return area_name(q_point);
+  const Anatomy& own = breast_frame(breast_of(point));
+  return own.side + " " + own.area_name(q_point);
+}
+
+std::vector<std::string> Anatomy::all_area_names() const {
+  if (breasts.empty()) return area_names();
+  std::vector<std::string> names;
+  for (const Anatomy& one : breasts)
+    for (const std::string& name : area_names()) names.push_back(one.side + " " + name);
+  return names;
+}
+
 const std::vector<std::string>& area_names() {
   static const std::vector<std::string> names = {"nipple area",  "upper outer",  "lower outer",
                                                  "upper inner",  "lower inner",  "fold",

@@ -52,17 +52,7 @@ class Adapter {
     collapse_short(1);
     for (int round = 0; round < most_splits && split_long(); ++round) {
     }
-    FieldMesh result;
-    std::vector<int> kept;
-    result.surface = work_.surface(with_regions, kept);
-    result.normals.resize(result.surface.points.rows(), 3);
-    result.size_mm.resize(result.surface.points.rows());
-    for (Eigen::Index p = 0; p < result.normals.rows(); ++p) {
-      result.normals.row(p) = normal_[kept[p]].normalized().transpose();
-      result.size_mm(p) = size_[kept[p]];
-      result.corner.push_back(work_.corner(Vertex(kept[p])) ? 1 : 0);
-    }
-    return result;
+    return what_is_left(work_, with_regions, normal_, size_);
   }
 
  private:

@@ -15,7 +15,8 @@ Eigen::Index mark_ligament_ring(TetMesh& mesh, const Anatomy& anatomy, double ha
         (anatomy.q.row(mesh.faces(f, 0)) + anatomy.q.row(mesh.faces(f, 1)) + anatomy.q.row(mesh.faces(f, 2)))
             .transpose() /
         3;
-    const bool in_ring = std::abs(anatomy.from_foot_mm(q)) <= half_width_mm;
+    const bool in_ring =
+        std::abs(anatomy.breast_frame(anatomy.breast_of(mesh.faces(f, 0))).from_foot_mm(q)) <= half_width_mm;
     mesh.region[f] = in_ring ? ligament : inner;
     if (in_ring) ++count;
   }

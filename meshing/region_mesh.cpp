@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "meshing/region_mesh.h"
 
+#include "meshing/field_mesh.h"
+
 namespace supine::meshing {
 
 using reconstruction::Surface;
@@ -97,6 +99,21 @@ Surface RegionMesh::surface(bool with_regions, std::vector<int>& kept) const {
     for (auto v = mesh_.cfv_begin(Face(faces[t])); v != mesh_.cfv_end(Face(faces[t])); ++v)
       result.triangles(static_cast<Eigen::Index>(t), corner++) = number[v->idx()];
     if (with_regions) result.region(static_cast<Eigen::Index>(t)) = region_[faces[t]];
+  }
+  return result;
+}
+
+FieldMesh what_is_left(const RegionMesh& mesh, bool with_regions, const std::vector<Eigen::Vector3d>& normals,
+                       const std::vector<double>& sizes_mm) {
+  FieldMesh result;
+  std::vector<int> kept;
+  result.surface = mesh.surface(with_regions, kept);
+  result.normals.resize(result.surface.points.rows(), 3);
+  result.size_mm.resize(result.surface.points.rows());
+  for (Eigen::Index p = 0; p < result.normals.rows(); ++p) {
+    result.normals.row(p) = normals[kept[p]].normalized().transpose();
+    result.size_mm(p) = sizes_mm[kept[p]];
+    result.corner.push_back(mesh.corner(RegionMesh::Vertex(kept[p])) ? 1 : 0);
   }
   return result;
 }

@@ -9,6 +9,8 @@
 
 namespace supine::meshing {
 
+struct FieldMesh;
+
 struct RegionTraits : OpenMesh::DefaultTraits {
   using Point = OpenMesh::Vec3d;
   using Normal = OpenMesh::Vec3d;
@@ -65,5 +67,10 @@ class RegionMesh {
   std::vector<int> region_;
   std::vector<char> on_border_, corner_;  // by vertex: true once, true for ever, for chains never end
 };
+
+/// The triangles left, with what they carry.
+/// @param normals, sizes_mm  by vertex of @p mesh; normals of any length
+FieldMesh what_is_left(const RegionMesh& mesh, bool with_regions, const std::vector<Eigen::Vector3d>& normals,
+                       const std::vector<double>& sizes_mm);
 
 }  // namespace supine::meshing

@@ -91,6 +91,22 @@ Json budget_json(const diagnosis::ErrorBudget& b) {
           {"numerical", b.numerical}, {"parameters", b.parameters}, {"model_form", b.model_form}};
 }
 
+Json forces_json(const Findings& found) {
+  if (!found.forces) return nullptr;
+  const diagnosis::ForceMap& map = *found.forces;
+  const Eigen::VectorXd size = map.force_kpa.rowwise().norm();
+  Eigen::Index place;
+  const double largest = size.maxCoeff(&place);
+  const auto at = found.base.fit.residuals.place.row(place);
+  return {{"meaning", "a hint, no diagnosis"},
+          {"largest_kpa", largest},
+          {"largest_at_mm", {at[0], at[1], at[2]}},
+          {"threshold_kpa", map.threshold_kpa},
+          {"share_above_threshold", (size.array() > map.threshold_kpa).cast<double>().mean()},
+          {"evidence_gain", map.evidence_gain},
+          {"null_gain", map.null_gain}};
+}
+
 std::string values_of(const std::vector<diagnosis::FittedParameter>& parameters) {
   std::string text;
   for (const auto& p : parameters) {
@@ -160,6 +176,11 @@ void say_verdict(const Run& run, const Findings& found) {
       break;
     case Verdict::unexplained:
       run.say(fmt::format("  unexplained: {}{}", d.why, names.empty() ? "" : "; best: " + names));
+      if (found.forces)
+        run.say(
+            fmt::format("  hint:     forces on the skin that would explain it reach {:.2f} kPa, {:.2f} by chance; "
+                        "missing_force_kpa in diagnosis.vtp",
+                        found.forces->force_kpa.rowwise().norm().maxCoeff(), found.forces->threshold_kpa));
   }
 }
 
@@ -249,6 +270,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
                                      {"closest_pair", next.closest_pair},
                                      {"mean_power_of_unseen", next.single_power},
                                      {"shows", next.shows}});
+  f["missing_force"] = forces_json(found);
   f["effective_points"] = found.table.effective_points;
   f["noise_mm"] = found.figures.noise_mm;
   f["numerical"] = found.numerical ? Json{{"spread_mm", found.sources.spread_mm},
@@ -286,7 +308,8 @@ void write_diagnosis_files(Run& run, const MeasuredCase& measured, const Diagnos
   }
   std::vector<std::string> poses;
   for (const auto& m : measured.fitted) poses.push_back(m.pose.name);
-  diagnosis::write_diagnosis(found.base.fit.residuals, poses, shapes, run.output(folder / "diagnosis.vtp"));
+  diagnosis::write_diagnosis(found.base.fit.residuals, poses, shapes, found.forces ? &*found.forces : nullptr,
+                             run.output(folder / "diagnosis.vtp"));
   const auto areas = calibration::anatomical_areas(measured.mesh, measured.anatomy);
   for (std::size_t m = 0; m < measured.fitted.size(); ++m) {
     const calibration::ModelSkin skin(measured.mesh, found.base.fit.prediction.solution.poses[m].x);
@@ -294,44 +317,6 @@ void write_diagnosis_files(Run& run, const MeasuredCase& measured, const Diagnos
     const fs::path file = folder / fmt::format("error_map_{}.vtp", poses[m]);
     diagnosis::write_error_map(skin, error, areas, run.output(file));
   }
-}
-
-Json ladder_figures(const diagnosis::Ladder& ladder) {
-  const auto rung = [](const diagnosis::Rung& r) {
-    return Json{{"added", r.added},
-                {"mae_mm", r.mae_mm},
-                {"rms_mm", r.rms_mm},
-                {"held_out_rms_mm", r.held_out_rms_mm},
-                {"held_out_pose_rms_mm", number_or_null(r.held_out_pose_rms_mm)},
-                {"p_value", r.p_value}};
-  };
-  Json f;
-  f["rungs"] = Json::array();
-  for (const auto& r : ladder.rungs) f["rungs"].push_back(rung(r));
-  const auto& other = ladder.random_other;
-  f["controls"] = {{"refit_only", rung(ladder.rungs.front())},
-                   {"random_other", other.added.empty() ? Json(nullptr) : rung(other)}};
-  f["verdict"] = diagnosis::verdict_name(ladder.verdict);
-  f["missing"] = ladder.missing;
-  f["stopped"] = ladder.stopped;
-  f["noise_floor_mm"] = ladder.noise_floor_mm;
-  f["parameters"] = Json::object();
-  const calibration::FreeParameters parameters(ladder.model);
-  for (Eigen::Index i = 0; i < parameters.size(); ++i)
-    f["parameters"][parameters.names()[static_cast<std::size_t>(i)]] = parameters.value(i, parameters.start()[i]);
-  return f;
-}
-
-void say_ladder(const Run& run, const diagnosis::Ladder& ladder) {
-  const auto line = [&run](const std::string& name, const diagnosis::Rung& r) {
-    run.say(fmt::format("  {:<28}{:>8.3f}{:>8.3f}{:>10.3f}{:>10}", name, r.mae_mm, r.rms_mm, r.held_out_rms_mm,
-                        r.held_out_pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", r.held_out_pose_rms_mm[0])));
-  };
-  run.say(fmt::format("  {:<28}{:>8}{:>8}{:>10}{:>10}", "ladder, mm", "MAE", "RMS", "held out", "pose"));
-  line("refit only", ladder.rungs.front());
-  if (!ladder.random_other.added.empty()) line("random: + " + ladder.random_other.added, ladder.random_other);
-  for (std::size_t r = 1; r < ladder.rungs.size(); ++r) line("+ " + ladder.rungs[r].added, ladder.rungs[r]);
-  run.say(fmt::format("  noise and mesh alone would leave {:.2f}; stopped: {}", ladder.noise_floor_mm, ladder.stopped));
 }
 
 }  // namespace supine::pipeline

@@ -6,7 +6,6 @@
 
 #include "diagnosis/examine.h"
 #include "diagnosis/hot_spots.h"
-#include "diagnosis/ladder.h"
 #include "diagnosis/next_measurement.h"
 #include "pipeline/measured_case.h"
 
@@ -34,9 +33,5 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result);
 /// diagnosis.vtp and the files beside it: error maps of the model's skin, scan points with the shapes of the effects.
 void write_diagnosis_files(Run& run, const MeasuredCase& measured, const DiagnosisResult& result,
                            const std::filesystem::path& folder);
-
-/// Keys of ladder.json, and its lines.
-nlohmann::ordered_json ladder_figures(const diagnosis::Ladder& ladder);
-void say_ladder(const Run& run, const diagnosis::Ladder& ladder);
 
 }  // namespace supine::pipeline

@@ -99,9 +99,6 @@ std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const fs::path& folde
   auto in = std::make_unique<MeasuredCase>();
   run.input(folder / "case.toml");
   in->description = read_case(folder);
-  if (in->description.side == "both")
-    throw InputError((folder / "case.toml").string() +
-                     ": case.side = \"both\" cannot be simulated yet: make one case per breast (left, right)");
   in->model_file = model_file.empty() ? folder / "model.toml" : model_file;
   in->model = read_model(run.input(in->model_file));
   in->mesh = meshing::read_mesh(run.input(mesh_file));

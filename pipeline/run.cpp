@@ -41,6 +41,7 @@ struct Run::State {
   std::string current_stage;
   Clock::time_point started = Clock::now(), stage_started = started;
   bool progress_shown = false;
+  std::vector<fs::path> no_longer_needed;
 
   explicit State(bool force_outputs) : force(force_outputs), outputs(force_outputs) {}
 
@@ -146,6 +147,8 @@ void Run::stage(const std::string& name) {
   state_->stage_started = now;
 }
 
+void Run::no_longer_needed(const fs::path& file) { state_->no_longer_needed.push_back(file); }
+
 void Run::finish() {
   const auto now = Clock::now();
   state_->stop_stage(now);
@@ -162,6 +165,8 @@ void Run::finish() {
     if (!sidecar.figures.empty()) printed[sidecar.target.filename().string()] = document;
   }
   state_->outputs.commit();
+  std::error_code none;
+  for (const fs::path& file : state_->no_longer_needed) fs::remove(file, none);
   state_->clear_progress();
   if (state_->json) fmt::print("{}\n", printed.size() == 1 ? printed.front().dump(2) : printed.dump(2));
 }

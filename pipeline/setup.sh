@@ -4,12 +4,16 @@
 set -euo pipefail
 
 packages=(
-  build-essential cmake ninja-build git jq
+  build-essential cmake ninja-build git jq python3
   libeigen3-dev libsuitesparse-dev libopenblas-pthread-dev
-  libvtk9-dev libcgal-dev libtet1.5-dev libopenmesh-dev libceres-dev libpagmo-dev libteem-dev libgdcm-dev zlib1g-dev
+  libvtk9-dev libcgal-dev libtet1.5-dev libopenmesh-dev libceres-dev libpagmo-dev libteem-dev libgdcm-dev libboost-dev zlib1g-dev
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libspdlog-dev libfmt-dev libssl-dev
   libgtest-dev libbenchmark-dev
+  xvfb libgl1-mesa-dri
 )
+
+# npm fetches vtk.js for the 3-D view of the report; any npm will do, and without one the report has no 3-D view.
+command -v npm >/dev/null || packages+=(nodejs npm)
 
 installed=$(dpkg-query -W -f='${db:Status-Status} ${Package}\n' 2>/dev/null || true)
 missing=()

@@ -44,6 +44,9 @@ class Run {
   /// Starts the named stopwatch of the sidecar's `timing` block and stops the one before.
   void stage(const std::string& name);
 
+  /// A file that helps an interrupted run to go on: removed once the outputs are there.
+  void no_longer_needed(const std::filesystem::path& file);
+
   /// Writes the sidecars and makes all outputs appear. Called by tool_main; a tool that throws before leaves nothing.
   void finish();
 

@@ -130,17 +130,26 @@ void check_obj_index(const std::string& token, long long vertices, const std::fi
 
 }  // namespace
 
+namespace {
+
+void declare_frame(const std::string& frame, const std::filesystem::path& file, Declaration& declaration) {
+  if (frame != "LPS" && frame != "RAS")
+    throw InputError(
+        fmt::format("{}: declares the frame \"{}\"; only LPS and RAS are understood", file.string(), frame));
+  if (declaration.frame && *declaration.frame != frame)
+    throw InputError(fmt::format("{}: declares both the frame {} and {}; keep the true one", file.string(),
+                                 *declaration.frame, frame));
+  declaration.frame = frame;
+}
+
+}  // namespace
+
 void read_declaration(std::string_view comment, const std::filesystem::path& file, Declaration& declaration) {
   const std::vector<std::string> w = words(comment);
   for (std::size_t i = 0; i + 1 < w.size(); ++i) {
-    if (w[i] == "frame") {
-      if (w[i + 1] != "LPS" && w[i + 1] != "RAS")
-        throw InputError(
-            fmt::format("{}: declares the frame \"{}\"; only LPS and RAS are understood", file.string(), w[i + 1]));
-      if (declaration.frame && *declaration.frame != w[i + 1])
-        throw InputError(fmt::format("{}: declares both the frame {} and {}; keep the true one", file.string(),
-                                     *declaration.frame, w[i + 1]));
-      declaration.frame = w[i + 1];
+    const bool slicer = w[i] == "SPACE" && (w[i + 1] == "LPS" || w[i + 1] == "RAS");  // how 3D Slicer says it
+    if (w[i] == "frame" || slicer) {
+      declare_frame(w[i + 1], file, declaration);
     } else if (w[i] == "unit") {
       if (w[i + 1] != "mm")
         throw InputError(fmt::format("{}: declares the unit \"{}\"; convert it to mm", file.string(), w[i + 1]));

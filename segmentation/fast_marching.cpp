@@ -108,9 +108,9 @@ class BucketQueue {
   std::vector<Entry> later_;
 };
 
-class March {
+class FrontRun {
  public:
-  March(const Image<float>& speed, const FastMarchingOptions& options)
+  FrontRun(const Image<float>& speed, const FastMarchingOptions& options)
       : speed_(speed), grid_(speed.grid), options_(options), queue_(bucket_width(speed)) {
     const Eigen::Vector3i padded = grid_.size.array() + 2 * rim;
     strides_ = {1, padded.x(), static_cast<std::ptrdiff_t>(padded.x()) * padded.y()};
@@ -281,7 +281,7 @@ void check(const Image<float>& speed, std::span<const FrontSource> sources, cons
 Image<float> fast_march(const Image<float>& speed, std::span<const FrontSource> sources,
                         const FastMarchingOptions& options) {
   check(speed, sources, options);
-  March march(speed, options);
+  FrontRun march(speed, options);
   for (const FrontSource& source : sources) march.start(source);
   return march.run();
 }

@@ -5,14 +5,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "common/error.h"
 
 namespace supine::segmentation {
 namespace {
 
-constexpr double mid_axillary_depth_mm = 45;  // behind the front of the chest wall over the sternum
-constexpr double mound_share = 0.15;          // of the mound's depth: where it begins
+constexpr double widest_share = 0.99;  // of its half width: from here on the chest counts as widest
+constexpr double mound_share = 0.15;   // of the mound's depth: where it begins
 constexpr double near_sternum_mm = 20, far_from_sternum_mm = 140;
 
 double median(std::vector<double> values) {
@@ -21,16 +22,31 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Median over the levels of the wall's place at one angle.
-double median_radius(const ChestWall& wall, double angle_rad) {
-  const auto a = static_cast<Eigen::Index>(std::lround((angle_rad - wall.first_angle_rad) / wall.step_angle_rad));
-  std::vector<double> radii;
-  for (Eigen::Index k = 0; k < wall.radius_mm.cols(); ++k) radii.push_back(wall.radius_mm(a, k));
-  return median(radii);
+/// The depth y at which one side of a level's chest wall stops widening; nothing where the image does not show its
+/// side.
+std::optional<double> side_of_chest(const ChestWall& wall, Eigen::Index k, double sign) {
+  std::vector<Eigen::Vector2d> side;  // from the front to the back: distance from the middle line, y
+  double widest = 0;
+  for (Eigen::Index a = 0; a < wall.radius_mm.rows(); ++a) {
+    const Eigen::Index ray = sign > 0 ? a : wall.radius_mm.rows() - 1 - a;
+    if (sign * wall.angle(ray) <= 0 || std::isnan(wall.price(ray, k))) continue;
+    const Eigen::Vector3d p = wall.point(ray, k);
+    side.emplace_back(sign * (p.x() - wall.torso.sternum_x(p.z())), p.y());
+    widest = std::max(widest, side.back().x());
+  }
+  for (const Eigen::Vector2d& place : side)
+    if (place.x() >= widest_share * widest) return place.y();
+  return std::nullopt;
 }
 
 double find_mid_axillary(const ChestWall& wall) {
-  return wall.centre_y_mm - median_radius(wall, 0) + mid_axillary_depth_mm;
+  std::vector<double> depths;
+  for (Eigen::Index k = 0; k < wall.radius_mm.cols(); ++k)
+    for (const double sign : {-1.0, 1.0})
+      if (const auto y = side_of_chest(wall, k, sign)) depths.push_back(*y);
+  if (depths.empty())
+    throw InputError("mid_axillary: the image shows no side of the chest; put the plane by hand (mid_axillary_mm)");
+  return median(depths);
 }
 
 /// Greatest depth of tissue in front of the chest wall on one side, per level; 0 where there is none.

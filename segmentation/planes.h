@@ -19,7 +19,8 @@ struct CutPlane {
 
 /// Places the planes of a model.
 ///
-/// sternum: the middle line of the torso. mid_axillary: 45 mm behind the front of the chest wall over the sternum.
+/// sternum: the middle line of the torso. mid_axillary: where the chest is widest, which is half way between its front
+/// and its back: the median over levels and sides of the depth at which the wall reaches 99 % of its half width.
 /// inframammary, one for each side: the lowest level at which the tissue in front of the chest wall is deeper than over
 /// the belly by 15 % of the mound's full depth. superior: the uppermost level of the image, less one voxel.
 std::vector<CutPlane> find_planes(const FrontSkin& front, const ChestWall& wall, const Planes& step);

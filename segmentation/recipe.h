@@ -72,6 +72,30 @@ struct Grow {
   std::string within;
 };
 
+/// mask = some of the classes that part the greys of `within` with least variance inside them (N. Otsu 1979).
+struct Otsu {
+  std::string mask;
+  int classes = 2;  ///< 2 to 8, numbered from 1 (darkest)
+  int first = 2;    ///< the mask is the classes from first to last
+  int last = 2;
+  std::string within;
+};
+
+/// mask = what a front from the seeds reaches (fast marching). It moves a mm of way in a mm of time where nothing holds
+/// it back, and slower at edges or where the grey is not the tissue's.
+struct March {
+  enum class Speed { gradient, greys };
+  std::string mask;
+  std::vector<Eigen::Vector3d> seeds_mm;  ///< at least one, each inside the image and where the speed is not 0
+  Speed speed = Speed::gradient;
+  double sigma_mm = 1;      ///< gradient: of the Gaussian before it; >= 0
+  double half_per_mm = 0;   ///< gradient (grey per mm) at which the speed is a half; > 0
+  double mean = 0, sd = 0;  ///< greys: speed exp(-(g - mean)^2 / (2 sd^2)); sd > 0
+  double stop_mm = 0;       ///< the front stands still when it would have come so far at full speed; > 0
+  int order = 2;            ///< 1 or 2
+  std::string within;       ///< the front does not leave this mask
+};
+
 /// Keeps the `keep_largest` largest components of the mask (0 = any number), and of those the ones of at least min_ml.
 struct Islands {
   std::string mask;
@@ -169,7 +193,7 @@ struct Paint {
 };
 
 using Step = std::variant<NoiseFloor, Bias, Smooth, Threshold, Grow, Islands, Holes, Combine, Morph, Layer, Region,
-                          Paint, Body, Chest, Planes>;
+                          Paint, Body, Chest, Planes, Otsu, March>;
 
 /// The steps of a segmentation, in the order in which they run.
 struct Recipe {

@@ -182,6 +182,35 @@ Step read_grow(Reader& r) {
   return step;
 }
 
+Step read_otsu(Reader& r) {
+  Otsu step;
+  step.mask = r.name("mask");
+  step.within = r.name_or_empty("within");
+  step.classes = r.whole_or("classes", step.classes, {2, 8, false});
+  step.first = r.whole_or("first", step.classes, {1, static_cast<double>(step.classes), false});
+  step.last = r.whole_or("last", step.classes, {static_cast<double>(step.first), static_cast<double>(step.classes)});
+  return step;
+}
+
+Step read_march(Reader& r) {
+  March step;
+  step.mask = r.name("mask");
+  step.seeds_mm = r.points("seeds_mm");
+  using Speed = March::Speed;
+  step.speed = r.choice<Speed>("speed", {{"gradient", Speed::gradient}, {"greys", Speed::greys}});
+  if (step.speed == Speed::gradient) {
+    step.sigma_mm = r.number_or("sigma_mm", step.sigma_mm, not_negative);
+    step.half_per_mm = r.number("half_per_mm", positive);
+  } else {
+    step.mean = r.number("mean", {});
+    step.sd = r.number("sd", positive);
+  }
+  step.stop_mm = r.number("stop_mm", positive);
+  step.order = r.whole_or("order", step.order, {1, 2, false});
+  step.within = r.name_or_empty("within");
+  return step;
+}
+
 Step read_islands(Reader& r) {
   Islands step;
   step.mask = r.name("mask");
@@ -318,7 +347,9 @@ const std::map<std::string, StepReader>& step_readers() {
                                                             {"paint", read_paint},
                                                             {"body", read_body},
                                                             {"chest", read_chest},
-                                                            {"planes", read_planes}};
+                                                            {"planes", read_planes},
+                                                            {"otsu", read_otsu},
+                                                            {"march", read_march}};
   return readers;
 }
 

@@ -4,13 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "common/error.h"
 #include "segmentation/body.h"
+#include "segmentation/fast_marching.h"
 #include "segmentation/grow.h"
 #include "segmentation/intensity.h"
 #include "segmentation/masks.h"
+#include "segmentation/otsu.h"
 
 namespace supine::segmentation {
 namespace {
@@ -53,6 +56,8 @@ class Kitchen {
   std::string run(const Body& step) { return store(step.mask, find_body(image_, step)); }
   std::string run(const Chest& step);
   std::string run(const Planes& step);
+  std::string run(const Otsu& step);
+  std::string run(const March& step);
 
   const std::vector<CutPlane>& planes() const { return planes_; }
   std::vector<ChestWall> take_walls() {
@@ -105,6 +110,36 @@ std::string Kitchen::run(const Grow& step) {
   GrowResult grown = grow(image_, step, within(step.within));
   return store(step.mask, std::move(grown.mask)) +
          fmt::format(", greys {:.4g} to {:.4g}", grown.range.lower, grown.range.upper);
+}
+
+std::string Kitchen::run(const Otsu& step) {
+  Mask result = step.within.empty() ? Mask(image_.voxels.size(), 1) : mask(step.within);
+  std::vector<float> greys;
+  for (std::size_t n = 0; n < result.size(); ++n)
+    if (result[n]) greys.push_back(image_.voxels[n]);
+  const std::vector<double> levels = otsu_levels(greys, step.classes);
+  GreyRange range;
+  if (step.first > 1) range.lower = static_cast<float>(levels[step.first - 2]);
+  if (step.last < step.classes) range.upper = std::nextafter(static_cast<float>(levels[step.last - 1]), -INFINITY);
+  for (std::size_t n = 0; n < result.size(); ++n) result[n] = result[n] && range.contains(image_.voxels[n]);
+  return store(step.mask, std::move(result)) + fmt::format(", levels {:.4g}", fmt::join(levels, ", "));
+}
+
+std::string Kitchen::run(const March& step) {
+  Image<float> speed = step.speed == March::Speed::gradient
+                           ? speed_from_gradient(image_, step.sigma_mm, step.half_per_mm)
+                           : speed_from_greys(image_, step.mean, step.sd);
+  if (!step.within.empty()) {
+    const Mask& inside = mask(step.within);
+    for (std::size_t n = 0; n < inside.size(); ++n)
+      if (!inside[n]) speed.voxels[n] = 0;
+  }
+  std::vector<FrontSource> sources;
+  for (const Eigen::Vector3d& seed : step.seeds_mm) sources.push_back({seed});
+  const Image<float> time = fast_march(speed, sources, {step.order, step.stop_mm});
+  Mask reached(time.voxels.size());
+  for (std::size_t n = 0; n < reached.size(); ++n) reached[n] = time.voxels[n] <= step.stop_mm;
+  return store(step.mask, std::move(reached)) + fmt::format(" within {:g} mm of the front's way", step.stop_mm);
 }
 
 std::string Kitchen::run(const Combine& step) {
@@ -218,9 +253,9 @@ std::string Kitchen::run(const Planes& step) {
   return line;
 }
 
-constexpr const char* step_names[] = {"noise_floor", "bias",  "smooth",  "threshold", "grow",
-                                      "islands",     "holes", "combine", "morph",     "layer",
-                                      "region",      "paint", "body",    "chest",     "planes"};
+constexpr const char* step_names[] = {"noise_floor", "bias",    "smooth", "threshold", "grow",   "islands",
+                                      "holes",       "combine", "morph",  "layer",     "region", "paint",
+                                      "body",        "chest",   "planes", "otsu",      "march"};
 static_assert(std::size(step_names) == std::variant_size_v<Step>);
 
 }  // namespace

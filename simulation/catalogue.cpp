@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/catalogue.h"
 
+#include "common/error.h"
 #include "simulation/effects/adhesion.h"
 #include "simulation/effects/arm_traction.h"
 #include "simulation/effects/chest_wall_motion.h"
@@ -9,6 +10,7 @@
 #include "simulation/effects/friction.h"
 #include "simulation/effects/gravity_tilt.h"
 #include "simulation/effects/incompressibility.h"
+#include "simulation/effects/left_right_stiffness.h"
 #include "simulation/effects/ligament.h"
 #include "simulation/effects/misregistration.h"
 #include "simulation/effects/segmentation_offset.h"
@@ -25,7 +27,9 @@ const std::vector<OptionRow>& Effect::options() const {
   return none;
 }
 
-const std::vector<const Effect*>& catalogue() {
+namespace {
+
+std::vector<const Effect*>& entries() {
   using segmentation::Tissue;
   static const Ligament ligament;
   static const Adhesion adhesion;
@@ -37,6 +41,7 @@ const std::vector<const Effect*>& catalogue() {
   static const TissueStiffness tumour(
       Tissue::tumour, {"log_ratio", "1", 0, 0, 2.6, 1.5, 0.7, true, "ln of tumour stiffness over fat stiffness"});
   static const StiffnessGradient stiffness_gradient;
+  static const LeftRightStiffness left_right_stiffness;
   static const SkinPrestretch skin_prestretch;
   static const SkinStiffening skin_stiffening;
   static const Friction friction;
@@ -46,13 +51,22 @@ const std::vector<const Effect*>& catalogue() {
   static const GravityTilt gravity_tilt;
   static const Misregistration misregistration;
   static const SegmentationOffset segmentation_offset;
-  static const std::vector<const Effect*> all = {
-      &adhesion,           &ligament,          &friction,        &strain_stiffening,
-      &fibre_anisotropy,   &incompressibility, &gland,           &tumour,
-      &stiffness_gradient, &skin_prestretch,   &skin_stiffening, &creep,
-      &arm_traction,       &chest_wall_motion, &gravity_tilt,    &misregistration,
-      &segmentation_offset};
+  static std::vector<const Effect*> all = {
+      &adhesion, &ligament,     &friction,           &strain_stiffening,    &fibre_anisotropy, &incompressibility,
+      &gland,    &tumour,       &stiffness_gradient, &left_right_stiffness, &skin_prestretch,  &skin_stiffening,
+      &creep,    &arm_traction, &chest_wall_motion,  &gravity_tilt,         &misregistration,  &segmentation_offset};
   return all;
+}
+
+}  // namespace
+
+const std::vector<const Effect*>& catalogue() { return entries(); }
+
+bool add_to_catalogue(const Effect& effect) {
+  if (find_effect(effect.name()) != nullptr)
+    throw InputError("the catalogue has an effect \"" + effect.name() + "\" already; give yours another name");
+  entries().push_back(&effect);
+  return true;
 }
 
 const Effect* find_effect(const std::string& name) {

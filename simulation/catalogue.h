@@ -62,6 +62,12 @@ class Effect {
 /// (adhesion) comes before what adds to it (ligament).
 const std::vector<const Effect*>& catalogue();
 
+/// Adds an effect of one's own at the end, for a source file that is linked to a tool:
+///   const MyEffect mine;  const bool known = supine::simulation::add_to_catalogue(mine);
+/// Before main() or at its beginning; @p effect must live as long as the program. @return true
+/// @throws InputError  the name is taken
+bool add_to_catalogue(const Effect& effect);
+
 /// @return nullptr for an unknown name
 const Effect* find_effect(const std::string& name);
 

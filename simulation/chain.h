@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "simulation/equilibrium.h"
+#include "simulation/linear_solver.h"
 
 namespace supine::simulation {
 
@@ -79,6 +81,9 @@ class Chain {
   std::vector<PoseLoad> poses_;
   Mechanics mechanics_;
   EquilibriumSolver solver_;
+  // Of Sensitivities that are gone: analysed once, ready for the next.
+  std::vector<std::unique_ptr<CholeskySolver>> spare_cholesky_;
+  std::vector<std::unique_ptr<LuSolver>> spare_lu_;
 };
 
 /// A chain used once, with its round trip and with effects that can change nothing refused.

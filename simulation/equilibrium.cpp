@@ -14,6 +14,8 @@ namespace {
 constexpr double sufficient_decrease = 1e-4;  // Armijo constant
 constexpr double natural_decrease = 0.25;     // Deuflhard's restricted monotonicity
 constexpr int max_halvings = 12;
+constexpr double longest_stride = 16;   // times a step of a changed tangent
+constexpr double still_steep = 0.3;     // share of the slope left that makes going on worth while
 constexpr double longest_step_mm = 40;  // a Newton step beyond this is shortened before the line search
 constexpr int stall_window = 12;        // iterations in which the residual must fall to stall_share of what it was
 constexpr double stall_share = 0.5;
@@ -161,12 +163,37 @@ bool EquilibriumSolver::search_line(Unknown unknown, const Points& known, Points
     if (last_digits) return true;  // the step moves by rounding only: neither merit says anything
     const double rounding = 1e-13 * (std::abs(energy) + std::abs(sums_.energy));
     if (use_energy ? sums_.energy <= energy + sufficient_decrease * alpha * slope + rounding
-                   : sums_.residual.norm() <= (1 - sufficient_decrease * alpha) * norm)
+                   : sums_.residual.norm() <= (1 - sufficient_decrease * alpha) * norm) {
+      if (use_energy && halving == 0 && !direction_.exact())
+        go_further(unknown, known, start, sought, load, step, slope, least_det_f);
       return true;
+    }
     if (!use_energy && direction_.natural_mm(sums_.residual) <= (1 - natural_decrease * alpha) * natural) return true;
   }
   sought = start;
   return false;
+}
+
+void EquilibriumSolver::go_further(Unknown unknown, const Points& known, const Points& start, Points& sought,
+                                   double load, const Eigen::VectorXd& step, double slope, double least_det_f) {
+  const auto move = [&](double alpha) {
+    Flat(sought.data(), sought.size()) = Eigen::Map<const Eigen::VectorXd>(start.data(), start.size()) + alpha * step;
+    evaluate(unknown, known, sought, load);
+  };
+  double alpha = 1;
+  while (alpha < longest_stride) {
+    const double energy = sums_.energy, here = sums_.residual.dot(step);
+    if (here > still_steep * slope) return;
+    // Where the slope would be zero if it went on changing as it did so far.
+    const double next = std::clamp(alpha * slope / (slope - here), 1.5 * alpha, 4 * alpha);
+    const double guess = here < slope ? 4 * alpha : next;
+    move(guess);
+    if (!sums_.valid || sums_.min_det_f < least_det_f || sums_.energy > energy) {
+      move(alpha);
+      return;
+    }
+    alpha = guess;
+  }
 }
 
 EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Points& known, Points& sought,

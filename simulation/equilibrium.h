@@ -67,6 +67,9 @@ class EquilibriumSolver {
   std::string failure(const Attempt& last, double load, const Points& shape) const;
   void note_state(Attempt& attempt) const;
   bool search_line(Unknown unknown, const Points& known, Points& sought, double load, const Eigen::VectorXd& step);
+  /// A changed tangent is too stiff, so its steps are too short: goes on along @p step while the energy falls steeply.
+  void go_further(Unknown unknown, const Points& known, const Points& start, Points& sought, double load,
+                  const Eigen::VectorXd& step, double slope, double least_det_f);
   Attempt newton(Unknown unknown, const Points& known, Points& sought, double load);
   static State state_of(Unknown unknown, const Points& known, const Points& sought, double load);
   void evaluate(Unknown unknown, const Points& known, const Points& sought, double load);

@@ -88,7 +88,7 @@ void FibreTerm<Element>::add(const State& state, const Demand& demand, Sums& sum
 template <class Element>
 void FibreTerm<Element>::add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const {
   const Eigen::VectorXd slope = fields.fibre_modulus.unaryExpr([](const Dual& k) { return k.v[0]; });
-  add_all(state, slope, Demand{.residual = true}, sums);
+  if ((slope.array() != 0).any()) add_all(state, slope, Demand{.residual = true}, sums);
 }
 
 template class FibreTerm<Tet4>;

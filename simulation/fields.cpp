@@ -42,17 +42,27 @@ Eigen::VectorXi faces_of(const meshing::TetMesh& mesh, std::initializer_list<Reg
   return Eigen::Map<Eigen::VectorXi>(rows.data(), static_cast<Eigen::Index>(rows.size()));
 }
 
+/// The breast that most of the corners belong to.
+template <class Corners>
+int breast_of(const meshing::Anatomy& anatomy, const Corners& corners) {
+  Eigen::Index right = 0;
+  for (const int corner : corners) right += anatomy.breast_of(corner);
+  return 2 * right > corners.size() ? 1 : 0;
+}
+
 template <class Face>
 FaceGroup quadrature_group(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, Eigen::VectorXi faces) {
   constexpr int n = Face::nodes;
   FaceGroup group;
   group.q.resize(faces.size() * Face::points, 2);
   group.area_mm2.resize(faces.size() * Face::points);
+  group.breast.resize(faces.size() * Face::points);
   for (Eigen::Index f = 0; f < faces.size(); ++f) {
     const auto nodes = gather<n>(mesh.points, mesh.faces, faces[f]);
     for (int p = 0; p < Face::points; ++p) {
       const Eigen::Index row = f * Face::points + p;
       group.q.row(row).setZero();
+      group.breast[row] = breast_of(anatomy, mesh.faces.row(faces[f]).head<3>());
       for (int a = 0; a < n; ++a)
         group.q.row(row) += Face::table().value[p][a] * anatomy.q.row(mesh.faces(faces[f], a));
       group.area_mm2[row] = face_point<Face>(nodes, p).area;
@@ -67,8 +77,10 @@ FaceGroup face_group(const meshing::TetMesh& mesh, const meshing::Anatomy& anato
   FaceGroup group;
   group.q.resize(faces.size(), 2);
   group.area_mm2.setZero(faces.size());
+  group.breast.resize(faces.size());
   for (Eigen::Index f = 0; f < faces.size(); ++f) {
     const auto corners = mesh.faces.row(faces[f]).head<3>();
+    group.breast[f] = breast_of(anatomy, corners);
     group.q.row(f) = (anatomy.q.row(corners[0]) + anatomy.q.row(corners[1]) + anatomy.q.row(corners[2])) / 3;
     const auto nodes = gather<Face::nodes>(mesh.points, mesh.faces, faces[f]);
     for (int p = 0; p < Face::points; ++p) group.area_mm2[f] += face_point<Face>(nodes, p).area;
@@ -85,8 +97,10 @@ Layout layout_of(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy) 
   layout.cut = quadrature_group<Face>(mesh, anatomy, faces_of(mesh, {Region::cut}));
   layout.skin_offset_once = std::make_shared<SkinOffsetOnce>();
   layout.cell_q.resize(mesh.cells.rows(), 2);
+  layout.cell_breast.resize(mesh.cells.rows());
   for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
     layout.cell_q.row(c).setZero();
+    layout.cell_breast[c] = breast_of(anatomy, mesh.cells.row(c).head<4>());
     for (int a = 0; a < 4; ++a) layout.cell_q.row(c) += 0.25 * anatomy.q.row(mesh.cells(c, a));
   }
   return layout;
@@ -243,9 +257,11 @@ void check_effects_act(const Model& model, const Scene& scene) {
       if (unread == nullptr) unread = reason;
     }
     if (acts) continue;
-    refuse(unread != nullptr ? unread
-                             : "the mesh has no tissue of its kind, or nothing lies where it acts (offset_mm, arc); "
-                               "remove the effect");
+    refuse(
+        unread != nullptr
+            ? unread
+            : "the mesh has no tissue of its kind or one breast only, or nothing lies where it acts (offset_mm, arc); "
+              "remove the effect");
   }
 }
 

@@ -85,15 +85,17 @@ struct FaceGroup {
   Eigen::VectorXi faces;     ///< rows of TetMesh::faces
   Table q;                   ///< #points by 2, anatomy coordinates; points of one face follow each other
   Eigen::VectorXd area_mm2;  ///< #points; imaged area each point stands for
+  Eigen::VectorXi breast;    ///< #points; row of Anatomy::breasts, 0 where there is one breast only
 };
 
 class SkinOffsetOnce;
 
 struct Layout {
-  FaceGroup skin;       ///< one point per face: its centroid
-  FaceGroup interface;  ///< inner and ligament regions, quadrature points
-  FaceGroup cut;        ///< quadrature points
-  Table cell_q;         ///< #cells by 2, anatomy coordinates of cell centroids
+  FaceGroup skin;               ///< one point per face: its centroid
+  FaceGroup interface;          ///< inner and ligament regions, quadrature points
+  FaceGroup cut;                ///< quadrature points
+  Table cell_q;                 ///< #cells by 2, anatomy coordinates of cell centroids
+  Eigen::VectorXi cell_breast;  ///< #cells; row of Anatomy::breasts, 0 where there is one breast only
 
   /// skin_offset() of the scene's mesh, which must be the layout's own; found when first asked for, then kept. Threads
   /// may ask at the same time.

@@ -163,6 +163,8 @@ LuSolver::LuSolver(const SparseMatrix& pattern) : state_(std::make_unique<State>
   state_->solver.umfpackControl()[UMFPACK_ORDERING] = UMFPACK_ORDERING_METIS;
   state_->solver.umfpackControl()[UMFPACK_IRSTEP] = 0;  // refinement triples the cost of a solve and is not needed
   state_->matrix = pattern;
+  // By the pattern alone: what comes out later must not depend on the numbers of the first matrix.
+  state_->matrix.coeffs() = 1;
   const std::lock_guard alone(metis_at_work);
   state_->solver.analyzePattern(state_->matrix);
 }

@@ -23,7 +23,6 @@ class Mechanics {
   const meshing::TetMesh& mesh() const { return mesh_; }
   const meshing::Anatomy& anatomy() const { return anatomy_; }
   bool has_energy() const;
-  bool holds_nodes() const { return any_held_; }
 
   /// Takes over material and loads of one pose.
   void set_fields(const Fields<double>& fields);

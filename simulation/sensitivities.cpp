@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "common/error.h"
 #include "simulation/linear_solver.h"
 #include "simulation/parameters.h"
@@ -16,28 +18,52 @@ Flat flat(const Points& points) { return Eigen::Map<const Flat>(points.data(), p
 
 Points shaped(const Flat& values) { return Eigen::Map<const Points>(values.data(), values.size() / 3, 3); }
 
+template <class Solver>
+using Spare = std::vector<std::unique_ptr<Solver>>;
+
+/// A solver taken from @p spare, or a new one; given back when it goes.
+template <class Solver>
+class Lent {
+ public:
+  Lent(Spare<Solver>& spare, const SparseMatrix& pattern) : spare_(spare) {
+    if (spare.empty()) {
+      solver_ = std::make_unique<Solver>(pattern);
+    } else {
+      solver_ = std::move(spare.back());
+      spare.pop_back();
+    }
+  }
+  ~Lent() { spare_.push_back(std::move(solver_)); }
+  Lent(const Lent&) = delete;
+  Lent& operator=(const Lent&) = delete;
+  Solver* operator->() const { return solver_.get(); }
+
+ private:
+  Spare<Solver>& spare_;
+  std::unique_ptr<Solver> solver_;
+};
+
 /// K of one pose, factorised: Cholesky where there is an energy, LU where there is none.
 class TangentSolver {
  public:
-  TangentSolver(const Mechanics& mechanics, const SparseMatrix& tangent, const std::string& pose) {
+  TangentSolver(Spare<CholeskySolver>& spare_cholesky, Spare<LuSolver>& spare_lu, bool has_energy,
+                const SparseMatrix& tangent, const std::string& pose) {
     bool done = false;
-    if (mechanics.has_energy()) {
-      cholesky_ = std::make_unique<CholeskySolver>(tangent);
-      done = cholesky_->factorise(tangent);
-    }
+    if (has_energy) done = cholesky_.emplace(spare_cholesky, tangent)->factorise(tangent);
     if (!done) {
       cholesky_.reset();
-      lu_ = std::make_unique<LuSolver>(tangent);
-      done = lu_->factorise(tangent);
+      done = lu_.emplace(spare_lu, tangent)->factorise(tangent);
     }
     if (!done) throw NumericalFailure("the tangent at the solution of '" + pose + "' is singular: no sensitivities");
   }
-  Flat solve(const Flat& b) const { return cholesky_ ? cholesky_->solve(b) : lu_->solve(b); }
-  Flat solve_transposed(const Flat& b) const { return cholesky_ ? cholesky_->solve(b) : lu_->solve_transposed(b); }
+  Flat solve(const Flat& b) const { return cholesky_ ? (*cholesky_)->solve(b) : (*lu_)->solve(b); }
+  Flat solve_transposed(const Flat& b) const {
+    return cholesky_ ? (*cholesky_)->solve(b) : (*lu_)->solve_transposed(b);
+  }
 
  private:
-  std::unique_ptr<CholeskySolver> cholesky_;
-  std::unique_ptr<LuSolver> lu_;
+  std::optional<Lent<CholeskySolver>> cholesky_;
+  std::optional<Lent<LuSolver>> lu_;
 };
 
 }  // namespace
@@ -48,7 +74,7 @@ struct Sensitivities::State {
   ChainSolution solution;
   Sums sums;
   SparseMatrix prone_tangent;  // ∂r/∂x of prone: what moving the known shape does
-  std::unique_ptr<LuSolver> inverse;
+  std::optional<Lent<LuSolver>> inverse;
   std::vector<std::unique_ptr<TangentSolver>> tangents;  // per pose but prone
   std::vector<SparseMatrix> reference_tangents;          // ∂r/∂X, per pose but prone
 
@@ -80,13 +106,13 @@ Sensitivities::Sensitivities(Chain& chain, const Model& model, const ChainSoluti
   State& s = *state_;
   s.linearise(0);
   s.prone_tangent = s.sums.tangent;
-  s.inverse = std::make_unique<LuSolver>(s.sums.reference_tangent);
-  if (!s.inverse->factorise(s.sums.reference_tangent))
+  if (!s.inverse.emplace(chain.spare_lu_, s.sums.reference_tangent)->factorise(s.sums.reference_tangent))
     throw NumericalFailure("the tangent of the undeformed shape is singular: no sensitivities");
   for (std::size_t p = 1; p < chain.poses().size(); ++p) {
     s.linearise(p);
     s.reference_tangents.push_back(s.sums.reference_tangent);
-    s.tangents.push_back(std::make_unique<TangentSolver>(chain.mechanics(), s.sums.tangent, chain.poses()[p].name));
+    s.tangents.push_back(std::make_unique<TangentSolver>(
+        chain.spare_cholesky_, chain.spare_lu_, chain.mechanics().has_energy(), s.sums.tangent, chain.poses()[p].name));
   }
 }
 
@@ -98,7 +124,7 @@ ChainDerivative Sensitivities::of(const std::string& parameter) const {
   Flat force = s.force_derivative(0, parameter, &result.prone);
   const Flat prone = flat(result.prone);
   if (!prone.isZero(0)) force += s.prone_tangent * prone;
-  const Flat undeformed = -s.inverse->solve(force);
+  const Flat undeformed = -(*s.inverse)->solve(force);
   result.X = shaped(undeformed);
   for (std::size_t p = 1; p < s.chain.poses().size(); ++p) {
     const Flat pull = s.force_derivative(p, parameter, nullptr) + s.reference_tangents[p - 1] * undeformed;
@@ -117,7 +143,7 @@ Eigen::VectorXd Sensitivities::gradient(const std::vector<Points>& by_pose,
     adjoint[p] = s.tangents[p - 1]->solve_transposed(flat(by_pose.at(p - 1)));
     pull -= s.reference_tangents[p - 1].transpose() * adjoint[p];
   }
-  adjoint[0] = s.inverse->solve_transposed(pull);
+  adjoint[0] = (*s.inverse)->solve_transposed(pull);
   Eigen::VectorXd gradient(parameters.size());
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     Points prone;

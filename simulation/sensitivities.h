@@ -23,7 +23,7 @@ struct ChainDerivative {
 /// and parameter after that.
 class Sensitivities {
  public:
-  /// @param solution  of @p model by @p chain. The chain must outlive the object.
+  /// @param solution  of @p model by @p chain. The chain must outlive the object, which lends it analysed solvers.
   /// @throws NumericalFailure  a pose at which the tangent is singular
   Sensitivities(Chain& chain, const Model& model, const ChainSolution& solution);
   ~Sensitivities();

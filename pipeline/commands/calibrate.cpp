@@ -191,7 +191,7 @@ class CalibrateTool : public Tool {
     fit.evaluations = found.evaluations, fit.failed = found.failed, fit.iterations = found.generations;
     fit.message = found.message;
     fit.converged = found.evaluations < max_evaluations_ || found.target_met;
-    journal.discard();
+    run.no_longer_needed(journal.file());
     return fit;
   }
 
@@ -208,7 +208,7 @@ class CalibrateTool : public Tool {
     calibration::write_map_csv(map, run.output(csv));
     calibration::write_map_vti(map, run.output(folder() / "error_map.vti"));
     run.figures(csv) = {{"parameters", {map.x_name, map.y_name}}, {"runs", map.results.size()}};
-    journal.discard();
+    run.no_longer_needed(journal.file());
   }
 
   void hold_out(const FreeParameters& parameters, const calibration::FitOptions& options,

@@ -13,6 +13,7 @@
 #include "meshing/mesh_io.h"
 #include "pipeline/case.h"
 #include "pipeline/model_file.h"
+#include "pipeline/picture.h"
 #include "pipeline/tool.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/catalogue.h"
@@ -58,6 +59,7 @@ class CompareTool : public Tool {
                    "model that says where the scan lies (effect misregistration): the scan and its landmarks are moved "
                    "there first");
     app.add_option("--pose", pose_name_, "which measurement of the case (default: the name of the pose file)");
+    declare_png(app, png_, "the model's skin coloured by its distance to the scan");
   }
 
   Outcome run(Run& run) override {
@@ -67,6 +69,7 @@ class CompareTool : public Tool {
     }
     run.stage("read");
     const Inputs inputs = read(run);
+    announce_png(run, png_, target(inputs.pose, "comparison"));
     const std::string scan_name = inputs.pose.surface->string();
     run.stage("check");
     const calibration::ModelSkin model(inputs.predicted.mesh, inputs.predicted.positions);
@@ -89,6 +92,11 @@ class CompareTool : public Tool {
                               {"scan_points", comparison.used.size()},
                               {"scan_points_used", comparison.scan_points_used},
                               {"scan_triangles", scan.distance().triangles().rows()}};
+    if (!png_.empty())
+      draw_distances(run.output(skin_file),
+                     fmt::format("{}, {}: RMS {:.2f} mm, mean {:.2f} mm", inputs.measured.name, inputs.pose.name,
+                                 comparison.scan.rms_mm, comparison.scan.mae_mm),
+                     run.output(png_));
     say(run, inputs.pose, comparison, landmarks);
     doubt(run, scan_name, comparison);
     return Outcome::done;
@@ -112,10 +120,6 @@ class CompareTool : public Tool {
   }
 
   calibration::SkinAreas find_areas(const Inputs& inputs, Run& run) const {
-    if (inputs.measured.side == "both") {
-      run.warn("no area table: the areas are those of one breast and the case has side = \"both\"");
-      return {};
-    }
     const auto anatomy = meshing::compute_anatomy(inputs.predicted.mesh, inputs.measured.side);
     return calibration::anatomical_areas(inputs.predicted.mesh, anatomy);
   }
@@ -227,7 +231,7 @@ class CompareTool : public Tool {
     }
   }
 
-  fs::path case_folder_, pose_file_, model_file_;
+  fs::path case_folder_, pose_file_, model_file_, png_;
   std::string pose_name_;
 };
 

@@ -3,6 +3,8 @@
 
 #include "common/error.h"
 #include "pipeline/diagnosis_report.h"
+#include "pipeline/ladder_report.h"
+#include "pipeline/picture.h"
 
 namespace supine::pipeline {
 namespace {
@@ -19,7 +21,7 @@ class DiagnoseTool : public Tool {
            "sure that is, what this scan cannot show and what to measure next.\n"
            "Writes diagnosis.json, diagnosis.vtp (scan points with the shape of each effect) and error_map_POSE.vtp "
            "(the "
-           "model's skin). -o names their folder (default: that of the mesh).\n\n"
+           "model's skin). -o names their folder (default: that of the mesh; with --ladder its subfolder ladder).\n\n"
            "Examples:\n"
            "  supine-diagnose mycase mycase/out/mesh.vtu\n"
            "  supine-diagnose mycase mycase/out/mesh.vtu --model mycase/out/model.toml -o trial\n";
@@ -46,12 +48,15 @@ class DiagnoseTool : public Tool {
         ->capture_default_str();
     app.add_flag("--ladder", ladder_,
                  "add what is missing, fit and examine again, until nothing is missing or three effects were added; "
-                 "writes ladder.json, the fitted numbers in it");
+                 "writes ladder.json and model.toml, the model as given with what was added and the fitted numbers");
     app.add_option("--seed", options_.seed, "of the draws behind the p values")->capture_default_str();
+    declare_png(app, png_, "the model's skin coloured by its mean distance to the scan");
   }
 
   Outcome run(Run& run) override {
     run.stage("read");
+    check_model_target(run);
+    announce_png(run, png_, folder() / "diagnosis.vtp");
     const auto measured = read_measured_case(run, case_folder_, mesh_file_, model());
     calibration::Evaluator evaluator(measured->fitted_scene(), measured->model);
     const std::vector<double> noise = measured->noise_mm(evaluator);
@@ -69,11 +74,13 @@ class DiagnoseTool : public Tool {
     run.stage("write");
     write_diagnosis_files(run, *measured, result, folder());
     run.figures(folder() / "diagnosis.vtp").update(diagnosis_figures(result));
+    if (!png_.empty()) draw(run, *measured);
     say_diagnosis(run, result);
     if (ladder_) {
       run.stage("ladder");
       const auto ladder = diagnosis::climb(subject_of(*measured, measured->model, noise), options_, *result.found);
       run.figures(folder() / "ladder.json") = ladder_figures(ladder);
+      write_models(run, ladder, measured->model_file);
       say_ladder(run, ladder);
     }
     return Outcome::done;
@@ -93,9 +100,43 @@ class DiagnoseTool : public Tool {
     return beside;
   }
 
-  fs::path folder() const { return output.empty() ? mesh_file_.parent_path() : output; }
+  fs::path folder() const {
+    if (!output.empty()) return output;
+    return ladder_ ? mesh_file_.parent_path() / "ladder" : mesh_file_.parent_path();
+  }
 
-  fs::path case_folder_, mesh_file_, model_file_;
+  /// The error map of the first pose that the model was fitted to.
+  void draw(Run& run, const MeasuredCase& measured) const {
+    const std::string pose = measured.fitted.front().pose.name;
+    const auto& figures = run.figures(folder() / "diagnosis.vtp");
+    std::string verdict = figures.at("verdict");
+    for (const auto& effect : figures.at("missing")) verdict += " " + effect.get<std::string>();
+    draw_distances(run.output(folder() / ("error_map_" + pose + ".vtp")),
+                   fmt::format("{}, {}: {}", measured.description.name, pose, verdict), run.output(png_));
+  }
+
+  /// The model it ends with, and that of every rung in a folder of its own, where its shapes find room.
+  void write_models(Run& run, const diagnosis::Ladder& ladder, const fs::path& read_from) const {
+    const auto write = [&](std::size_t rung, const fs::path& file) {
+      write_rung_model(ladder, rung, read_from, run.output(file));
+      run.figures(file) = {{"fitted_from", read_from.filename().string()}};
+    };
+    write(ladder.rungs.size() - 1, folder() / "model.toml");
+    for (std::size_t rung = 1; rung < ladder.rungs.size(); ++rung)
+      write(rung, folder() / std::to_string(rung) / "model.toml");
+  }
+
+  /// A ladder takes a minute: that its model cannot be written is better known before.
+  void check_model_target(const Run& run) const {
+    const fs::path target = folder() / "model.toml";
+    if (ladder_ && !run.force() && fs::exists(target))
+      throw InputError(
+          fmt::format("{} exists already and --ladder writes the model it ends with there; name another "
+                      "folder with -o, or replace it with --force",
+                      target.string()));
+  }
+
+  fs::path case_folder_, mesh_file_, model_file_, png_;
   diagnosis::ExamineOptions options_;
   bool no_other_meshes_ = false, ladder_ = false;
 };

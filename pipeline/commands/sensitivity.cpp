@@ -9,6 +9,7 @@
 #include "common/error.h"
 #include "pipeline/journal_key.h"
 #include "pipeline/measured_case.h"
+#include "pipeline/picture.h"
 
 namespace supine::pipeline {
 namespace {
@@ -46,12 +47,14 @@ class SensitivityTool : public Tool {
         ->check(CLI::IsMember({"prior", "normal"}))
         ->capture_default_str();
     app.add_option("--seed", seed_, "of the draws")->capture_default_str();
+    declare_png(app, png_, "a histogram of the error with its quantiles");
   }
 
   Outcome run(Run& run) override {
     run.stage("read");
     const fs::path target = target_file();
     run.output(target);  // before the work, so that nobody waits for what cannot be written
+    announce_png(run, png_, target);
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
     const FreeParameters parameters(measured_->model);
     const DrawKind kind = law_ == "normal" ? DrawKind::normal : DrawKind::prior;
@@ -87,7 +90,7 @@ class SensitivityTool : public Tool {
       failed += result.failed;
       live.show(fmt::format("run {} of {}, {} without equilibrium", ++finished, draws.values.size(), failed));
     });
-    journal.discard();
+    run.no_longer_needed(journal.file());
     return results;
   }
 
@@ -143,6 +146,15 @@ class SensitivityTool : public Tool {
                                  {"median", calibration::percentile({values.col(p).begin(), values.col(p).end()}, 0.5)},
                                  {"variance_share", shares[p]}});
     f["interaction_share"] = std::max(0.0, 1 - shares.sum());
+    if (!png_.empty())
+      draw_histogram(
+          {fmt::format("{}: {} draws, {} without equilibrium", measured_->description.name, samples_, failed),
+           "MAE model to scan, mm",
+           mae,
+           {{"5 %", calibration::percentile(mae, 0.05)},
+            {"median", calibration::percentile(mae, 0.5)},
+            {"95 %", calibration::percentile(mae, 0.95)}}},
+          run.output(png_));
     say(run, parameters, mae, {m.mean(), sd}, shares, failed);
   }
 
@@ -159,7 +171,7 @@ class SensitivityTool : public Tool {
     run.say(fmt::format("  {:>5.1f} % from the parameters acting together", 100 * std::max(0.0, 1 - shares.sum())));
   }
 
-  fs::path case_folder_, mesh_file_, model_file_;
+  fs::path case_folder_, mesh_file_, model_file_, png_;
   int samples_ = 1000;
   std::string law_ = "prior";
   unsigned seed_ = 1;

@@ -13,6 +13,7 @@
 #include "simulation/bulk.h"
 #include "simulation/chain.h"
 #include "simulation/embedding.h"
+#include "simulation/export/exported_pose.h"
 #include "simulation/linear_solver.h"
 
 namespace supine::pipeline {
@@ -27,6 +28,10 @@ using simulation::PoseSolution;
 const std::map<std::string, InverseMethod> inverse_methods = {{"newton", InverseMethod::newton},
                                                               {"fixed-point", InverseMethod::fixed_point},
                                                               {"reversed-gravity", InverseMethod::reversed_gravity}};
+
+const std::map<std::string, simulation::Solver> solvers = {{"calculix", simulation::Solver::calculix},
+                                                           {"febio", simulation::Solver::febio},
+                                                           {"sofa", simulation::Solver::sofa}};
 
 // A round trip beyond this is not a certificate; the true inverse ends orders below.
 constexpr double round_trip_bound_mm = 1e-6;
@@ -68,7 +73,8 @@ class SimulateTool : public Tool {
            "in each pose. -o names their folder (default: that of the mesh).\n\n"
            "Examples:\n"
            "  supine-simulate mycase mycase/out/mesh.vtu\n"
-           "  supine-simulate mycase mycase/out/mesh.vtu --model stiff.toml --pose supine -o trial\n";
+           "  supine-simulate mycase mycase/out/mesh.vtu --model stiff.toml --pose supine -o trial\n"
+           "  supine-simulate mycase mycase/out/mesh.vtu --export calculix -o trial\n";
   }
 
   void declare(CLI::App& app) override {
@@ -81,12 +87,18 @@ class SimulateTool : public Tool {
                    "reversed-gravity")
         ->check(CLI::IsMember({"newton", "fixed-point", "reversed-gravity"}))
         ->capture_default_str();
+    app.add_option("--export", export_to_,
+                   "also write every pose, from the undeformed shape, as input for another solver: calculix, febio, "
+                   "sofa (docs/second-opinion.md)")
+        ->check(CLI::IsMember({"calculix", "febio", "sofa"}));
   }
 
   Outcome run(Run& run) override {
     run.stage("read");
     const Inputs in = read(run);
     warn_of_locking(run, in);
+    if (!export_to_.empty())
+      simulation::check_exportable(solvers.at(export_to_), in.mesh, in.anatomy, in.model, in.loads);
     run.stage("solve");
     simulation::SolveOptions options;
     options.progress = [&run](const std::string& what, double load, int iteration, double share) {
@@ -97,6 +109,7 @@ class SimulateTool : public Tool {
         simulation::solve_chain(in.mesh, in.anatomy, in.model, in.loads, inverse_methods.at(inverse_), options);
     run.stage("write");
     write(run, in, solution);
+    if (!export_to_.empty()) write_exports(run, in, solution);
     say(run, in, solution);
     for (const std::string& warning : solution.warnings) run.warn(warning);
     return judge(run, solution);
@@ -132,9 +145,6 @@ class SimulateTool : public Tool {
     Inputs in{read_case(case_folder_), {}, {}, {}, {}};
     in.model = read_model(run.input(model_file_.empty() ? case_folder_ / "model.toml" : model_file_));
     in.mesh = meshing::read_mesh(run.input(mesh_file_));
-    if (in.measured.side == "both")
-      throw InputError((case_folder_ / "case.toml").string() +
-                       ": case.side = \"both\" cannot be simulated yet: make one case per breast (left, right)");
     in.anatomy = meshing::compute_anatomy(in.mesh, in.measured.side);
     for (const std::string& wanted : pose_names_) in.measured.pose(wanted);
     for (const Pose& pose : in.measured.poses)
@@ -213,6 +223,28 @@ class SimulateTool : public Tool {
     }
   }
 
+  /// Every pose for another solver, and beside it the displacements that ours found.
+  void write_exports(Run& run, const Inputs& in, const ChainSolution& solution) const {
+    const simulation::Solver solver = solvers.at(export_to_);
+    for (std::size_t p = 0; p < in.loads.size(); ++p) {
+      const Points& x = p == 0 ? solution.prone : solution.poses[p - 1].x;
+      const auto pose = simulation::export_pose(in.mesh, in.anatomy, in.model, in.loads[p], solution.X, x);
+      const fs::path file = folder() / (in.loads[p].name + "_" + export_to_ + simulation::export_extension(solver));
+      simulation::write_export(solver, pose, run.output(file));
+      const fs::path table = folder() / (in.loads[p].name + "_displacement.csv");
+      simulation::write_displacements(pose, run.output(table));
+      Json& f = run.figures(file);
+      f["solver"] = export_to_;
+      f["nodes"] = pose.nodes;
+      f["skin_tetrahedra"] = pose.skin.rows();
+      f["springs"] = pose.springs.size();
+      f["materials"] = pose.materials.size();
+      f["compare_with"] = table.filename().string();
+      run.say(fmt::format("  {} for {}: {} springs, {} skin tetrahedra; compare with {}", file.string(), export_to_,
+                          pose.springs.size(), pose.skin.rows(), table.filename().string()));
+    }
+  }
+
   Json figures(const Inputs& in, const ChainSolution& solution, const simulation::SolveReport& report,
                const Points& x) const {
     const Eigen::VectorXd from_prone = (x - in.mesh.points).rowwise().norm();
@@ -229,10 +261,12 @@ class SimulateTool : public Tool {
     f["residual_share"] = report.residual_share;
     f["displacement_from_prone_mm"] = {{"rms", rms(from_prone)}, {"max", from_prone.maxCoeff()}};
     f["displacement_from_undeformed_mm"] = {{"rms", rms(from_undeformed)}, {"max", from_undeformed.maxCoeff()}};
-    if (const int nipple = in.anatomy.nipple_point; nipple >= 0)
-      f["nipple_mm"] = {x(nipple, 0), x(nipple, 1), x(nipple, 2)};
-    else
-      f["nipple_mm"] = nullptr;
+    const auto place = [&x](int point) -> Json {
+      if (point < 0) return nullptr;
+      return {x(point, 0), x(point, 1), x(point, 2)};
+    };
+    if (in.anatomy.breasts.empty()) f["nipple_mm"] = place(in.anatomy.nipple_point);
+    for (const meshing::Anatomy& one : in.anatomy.breasts) f["nipple_mm"][one.side] = place(one.nipple_point);
     f["load_number"] = simulation::load_number(in.anatomy, in.model);
     f["nodes"] = in.mesh.points.rows();
     f["tetrahedra"] = in.mesh.cells.rows();
@@ -260,7 +294,7 @@ class SimulateTool : public Tool {
 
   fs::path case_folder_, mesh_file_, model_file_;
   std::vector<std::string> pose_names_;
-  std::string inverse_ = "newton";
+  std::string inverse_ = "newton", export_to_;
 };
 
 }  // namespace

@@ -28,9 +28,9 @@ void ArmTraction::apply(const Scene& scene, std::span<const Dual> values, const 
   for (Eigen::Index f = 0; f < skin.faces.size(); ++f) {
     const double weight = bump(skin.q.row(f).transpose(), patch_centre, patch_radius);
     if (weight == 0) continue;
+    const meshing::Anatomy& breast = scene.anatomy.breast_frame(skin.breast[f]);
     for (int i = 0; i < 3; ++i)
-      fields.skin_traction[3 * f + i] +=
-          weight * (values[0] * scene.anatomy.lateral[i] + values[1] * scene.anatomy.head[i]);
+      fields.skin_traction[3 * f + i] += weight * (values[0] * breast.lateral[i] + values[1] * breast.head[i]);
   }
 }
 

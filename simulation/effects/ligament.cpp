@@ -75,7 +75,7 @@ void Ligament::apply(const Scene& scene, std::span<const Dual> values,
   for (Eigen::Index p = 0; p < group.q.rows(); ++p) {
     const Eigen::Vector2d q = group.q.row(p).transpose();
     if (!in_arc(options.at("arc"), q)) continue;
-    weight[p] = ring_weight(scene.anatomy.from_foot_mm(q) - values[1], 0.5 * values[2]);
+    weight[p] = ring_weight(scene.anatomy.breast_frame(group.breast[p]).from_foot_mm(q) - values[1], 0.5 * values[2]);
     plain[p] = weight[p].a;
   }
   const Dual stiffness = options.at("tie") == "rigid" ? Dual(rigid_stiffness(scene, plain)) : values[0];

@@ -165,6 +165,20 @@ TEST(LeastSquares, EveryParameterAtItsBoundIsAnAnswerToo) {
   EXPECT_DOUBLE_EQ(values[1], 50);
 }
 
+TEST(LeastSquares, RefusesARefitWithNothingToFit) {
+  const FreeParameters parameters(twin_start());
+  Evaluator evaluator(exact_twin().scene(), twin_start());
+  FitOptions options;
+  options.noise_mm = {0.7};
+  const Fit fit = evaluate_fit(evaluator, parameters, options, parameters.start());
+  try {
+    refit(evaluator, parameters, options, fit, fit.u, {true, true});
+    FAIL() << "both parameters are held";
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "every parameter is held: nothing to fit");
+  }
+}
+
 TEST(LeastSquares, RefusesOptionsThatMeanNothing) {
   const FreeParameters parameters(twin_start());
   Evaluator evaluator(exact_twin().scene(), twin_start());

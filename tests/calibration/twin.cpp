@@ -41,9 +41,10 @@ reconstruction::Surface scan_of(const calibration::ModelSkin& skin, const Twin::
 }  // namespace
 
 Twin::Twin(const Options& options) {
-  mesh = moved(dome_scene().mesh, options.frame.rotation(), options.frame.translation());
+  const TestScene& body = options.body != nullptr ? *options.body : dome_scene();
+  mesh = moved(body.mesh, options.frame.rotation(), options.frame.translation());
   const bool stays = options.frame.matrix() == Eigen::Matrix4d::Identity();
-  anatomy = stays ? dome_scene().anatomy : meshing::compute_anatomy(mesh, "left");
+  anatomy = stays ? body.anatomy : meshing::compute_anatomy(mesh, body.anatomy.side);
   prone = {"prone", options.frame.rotation() * Eigen::Vector3d(0, -1, 0)};
   supine = {"supine", options.frame.rotation() * Eigen::Vector3d(0.2, 0.9, 0.1).normalized()};
   simulation::Chain chain(mesh, anatomy, options.truth, {prone, supine});

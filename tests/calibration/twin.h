@@ -19,6 +19,7 @@ struct Twin {
     double left_out_from_x = 1e9;                             ///< a hole: no scan where x is beyond this
     bool reversed = false;                                    ///< points and triangles in the opposite order
     Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();  ///< everything seen from elsewhere
+    const TestScene* body = nullptr;                          ///< another body than dome_scene()
   };
 
   explicit Twin(const Options& options);

@@ -57,6 +57,38 @@ TEST(Decide, DoesNotNameWhatTheHeldOutErrorDoesNotConfirm) {
   EXPECT_EQ(quiet.verdict, Verdict::nothing_missing);
 }
 
+/// A refit whose interval leaves out the null.
+Refit sure_refit(double bic, double held_out, std::vector<double> poses = {}) {
+  Refit r = refit("ligament", bic, held_out, std::move(poses));
+  r.parameters = {{"ligament.stiffness_kpa_per_mm", "kPa/mm", 0.4, 0.2, 0.7}};
+  return r;
+}
+
+TEST(Decide, ALowPNamesWhatLiesUnderOneBlockOfSkinAlone) {
+  EXPECT_EQ(verdict({sure_refit(60, 1.8)}).verdict, Verdict::missing);
+  EXPECT_EQ(verdict({sure_refit(60, 1.8)}, nothing_left, 0.03).verdict, Verdict::unexplained) << "p";
+  EXPECT_EQ(verdict({sure_refit(4, 1.8)}).verdict, Verdict::unexplained) << "BIC";
+  Refit open = sure_refit(60, 1.8);
+  open.parameters[0].low = 0;
+  EXPECT_EQ(verdict({open}).verdict, Verdict::unexplained) << "interval";
+}
+
+TEST(Decide, AnUnfittedPoseCanDenyIt) {
+  BaseFigures base = base_figures(real_left);
+  base.pose_rms_mm = {1.0};
+  const auto with_pose = [&base](double pose) {
+    return decide(table_with(0.001), {sure_refit(60, 1.8, {pose})}, {nothing_left}, base).verdict;
+  };
+  EXPECT_EQ(with_pose(1.01), Verdict::missing);
+  EXPECT_EQ(with_pose(1.1), Verdict::unexplained);
+}
+
+TEST(Decide, WhatComesNearIsARivalWhetherItCountsOrNot) {
+  const Diagnosis d = verdict({sure_refit(20, 1.39), refit("segmentation_offset", 16, 1.39)});
+  EXPECT_EQ(d.verdict, Verdict::ambiguous);
+  EXPECT_EQ(d.missing, (Names{"segmentation_offset", "ligament"}));
+}
+
 TEST(Decide, NamesNothingByChance) {
   const auto d = decide(table_with(0.2), {refit("ligament", 60, 0.8)}, {nothing_left}, base_figures(nothing_left));
   EXPECT_EQ(d.verdict, Verdict::nothing_missing);

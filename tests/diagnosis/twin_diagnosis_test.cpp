@@ -129,5 +129,22 @@ TEST(TwinDiagnosis, ALigamentIsAmongWhatIsNamed) {
   EXPECT_TRUE(names(found->diagnosis, "ligament"));
 }
 
+TEST(TwinDiagnosis, TheMapOfMissingForcesShowsATractionAndStaysBelowItsThresholdWithoutOne) {
+  const auto map_of = [](const Twin& twin, const Findings& found) {
+    return force_map(twin.scene(), found.model, found.base, found.metric, 1, 40);
+  };
+  const Twin pulled({with("arm_traction", "lateral_kpa", 0.3), noise_mm});
+  const auto found = findings_of(pulled, 0);
+  const ForceMap map = map_of(pulled, *found);
+  EXPECT_GT(map.evidence_gain, map.null_gain);
+  Eigen::Index strongest;
+  EXPECT_GT(map.force_kpa.rowwise().norm().maxCoeff(&strongest), map.threshold_kpa);
+  EXPECT_GT(map.force_kpa.row(strongest).dot(pulled.anatomy.lateral), 0);
+  const Twin quiet({supine::testing::twin_truth(), noise_mm});
+  const auto nothing = findings_of(quiet, 0);
+  const ForceMap none = map_of(quiet, *nothing);
+  EXPECT_LT(none.evidence_gain, 0.2 * map.evidence_gain);
+}
+
 }  // namespace
 }  // namespace supine::diagnosis

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "common/error.h"
 #include "tests/diagnosis/sheet.h"
 
 namespace supine::diagnosis {
@@ -37,6 +38,19 @@ TEST(Whitening, ErrorsOfAllSourcesBecomeIndependent) {
   for (int i = 0; i < 300; ++i) by_point.row(i) = sigma.row(clusters.of_point[i]);
   const Eigen::MatrixXd half = whitening.apply(by_point);  // L⁻¹ Σ = Lᵀ
   EXPECT_LT((half.transpose() * half - sigma).norm(), 1e-9 * sigma.norm());
+}
+
+TEST(Whitening, RefusesErrorsWithoutNoise) {
+  const calibration::Residuals r = sheet(5, 200);
+  ErrorSources sources = sources_of(r);
+  sources.noise_mm.setZero();
+  sources.spread_mm = 0;
+  try {
+    Whitening::of(r, sources);
+    FAIL() << "points without any error of their own";
+  } catch (const NumericalFailure& failure) {
+    EXPECT_NE(std::string(failure.what()).find("not positive"), std::string::npos) << failure.what();
+  }
 }
 
 TEST(Whitening, AnErrorModeCountsForLittleAndItsOppositeForAsMuchAsBefore) {

@@ -94,6 +94,7 @@ TEST_F(SurfaceFiles, PlyTextAndItsFrame) {
   EXPECT_EQ(turned.points.row(1), Eigen::RowVector3d(-10, 0, 0));
   EXPECT_EQ(turned.points.row(2), Eigen::RowVector3d(0, -20, 0));
   EXPECT_DOUBLE_EQ(check_surface(turned).volume_mm3, 1000) << "a turn keeps the orientation";
+  EXPECT_EQ(read_surface(write("d.ply", ply("comment SPACE=RAS\n")), "LPS").points, turned.points) << "3D Slicer";
   EXPECT_EQ(read_surface(folder_ / "a.ply", "RAS").points, turned.points) << "a bare file takes the frame of the case";
   EXPECT_EQ(read_surface(folder_ / "b.ply", "RAS").points, bare.surface.points) << "the file's own word goes first";
 }

@@ -22,7 +22,9 @@ Eigen::VectorXd all_numbers(const Fields<double>& f) {
 
 class CatalogueTest : public ::testing::TestWithParam<const Effect*> {
  protected:
-  CatalogueTest() : scene(testing::dome_scene()), layout(make_layout(scene.mesh, scene.anatomy)) {
+  CatalogueTest()
+      : scene(GetParam()->name() == "left_right_stiffness" ? testing::two_breasts_scene() : testing::dome_scene()),
+        layout(make_layout(scene.mesh, scene.anatomy)) {
     // Half gland, half fat, a little tumour: every tissue effect has something to act on.
     scene.mesh.fraction.setZero();
     for (Eigen::Index c = 0; c < scene.mesh.cells.rows(); ++c) {

@@ -4,6 +4,7 @@
 #include <map>
 
 #include "tests/support/shapes.h"
+#include "tests/support/two_breasts.h"
 
 namespace supine::testing {
 namespace {
@@ -76,6 +77,16 @@ TestScene box_scene(int n, const Eigen::Vector3d& size_mm) {
       mesh.region[f] = static_cast<int>(Region::cut);
   }
   scene.anatomy = box_anatomy(mesh, size_mm);
+  return scene;
+}
+
+const TestScene& two_breasts_scene() {
+  static const TestScene scene = [] {
+    TestScene made;
+    made.mesh = two_breasts_mesh({.left_height_mm = 48, .right_height_mm = 42, .across = 22, .up = 11, .deep = 2});
+    made.anatomy = meshing::compute_anatomy(made.mesh, "both");
+    return made;
+  }();
   return scene;
 }
 

@@ -21,6 +21,9 @@ TestScene box_scene(int n, const Eigen::Vector3d& size_mm);
 /// A small dome on a cylinder-like muscle, sagging along -y when prone. Made once.
 const TestScene& dome_scene(int order = 1);
 
+/// Two breasts of one piece over one flat muscle, sagging along -y when prone; the right one is the smaller. Made once.
+const TestScene& two_breasts_scene();
+
 /// The same mesh with straight-sided quadratic elements.
 meshing::TetMesh quadratic(const meshing::TetMesh& linear);
 

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/phantom/phantom.h"
+
+#include <fmt/format.h>
+
+#include "common/error.h"
+#include "pipeline/tool.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+class PhantomTool : public Tool {
+ public:
+  std::string name() const override { return "supine-phantom"; }
+
+  std::string summary() const override {
+    return "Makes a case whose answer is known and kept elsewhere: a computed breast with one, two or no effects that "
+           "the base model lacks.\n"
+           "-o names the case folder; the answer is written beside it, answers/NAME.json, or where --answer says. The "
+           "case folder tells nothing of the answer.\n\n"
+           "Examples:\n"
+           "  supine-phantom --effect ligament --seed 7 -o trials/case-007\n"
+           "  supine-phantom --effect null --tilt -o trials/case-008\n"
+           "  supine-phantom --outside coil_contact --seed 9 -o trials/case-009 --answer sealed/9.json\n";
+  }
+
+  void declare(CLI::App& app) override {
+    app.add_option("--effect", effects_, "an effect of the catalogue (supine-model list), or null; up to two");
+    app.add_option("--outside", options_.outside,
+                   "a cause that is not in the catalogue: coil_contact, scar or skin_gradient");
+    app.add_option("--seed", options_.seed, "of body, sizes, noise and holes")->capture_default_str();
+    app.add_flag("--tilt", options_.tilt, "also a scan of the body tilted by 45 degrees");
+    app.add_option("--noise-mm", options_.noise_mm, "scanner noise along the normal, 1 sigma, 0 to 5")
+        ->capture_default_str();
+    app.add_option("--voxel-mm", options_.voxel_mm, "of the labels, 0.5 to 4")->capture_default_str();
+    app.add_option("--rings", options_.rings, "fineness of the truth's mesh: rings of triangles on the skin, 4 to 30")
+        ->capture_default_str();
+    app.add_option("--order", options_.order, "of the truth's elements: 1 linear, 2 quadratic")->capture_default_str();
+    app.add_option("--answer", answer_, "file of the answer, outside the case folder (.json)");
+  }
+
+  Outcome run(Run& run) override {
+    const fs::path folder = case_folder();
+    const fs::path answer = answer_file(folder);
+    take_effects();
+    run.stage("make");
+    const phantom::Phantom phantom = phantom::make_phantom(options_);
+    run.stage("write");
+    Outputs outputs(run.force());
+    phantom::write_case_folder(folder, phantom.contents, outputs);
+    run.output(answer);
+    run.figures(answer) = figures(folder, phantom);
+    outputs.commit();
+    run.say(fmt::format("{}: {} side, {:.0f} ml; the answer is in {}", folder.string(), phantom.body.side,
+                        phantom.volume_ml, answer.string()));
+    return Outcome::done;
+  }
+
+ private:
+  fs::path case_folder() const {
+    if (output.empty()) throw InputError("name the case folder to make with -o");
+    return fs::absolute(output / "").lexically_normal().parent_path();
+  }
+
+  fs::path answer_file(const fs::path& folder) const {
+    const fs::path file = answer_.empty() ? folder.parent_path() / "answers" / (folder.filename().string() + ".json")
+                                          : fs::absolute(answer_).lexically_normal();
+    if (file.extension() != ".json") throw InputError(fmt::format("--answer {}: it must end in .json", file.string()));
+    const fs::path inside = file.lexically_relative(folder);
+    if (!inside.empty() && *inside.begin() != "..")
+      throw InputError(
+          fmt::format("--answer {} lies in the case folder {}: whoever reads the case would read the "
+                      "answer; name a place outside",
+                      file.string(), folder.string()));
+    return file;
+  }
+
+  void take_effects() {
+    bool none = false;
+    for (const std::string& effect : effects_) {
+      none = none || effect == "null";
+      if (effect != "null") options_.effects.push_back(effect);
+    }
+    if (none && !(options_.effects.empty() && options_.outside.empty()))
+      throw InputError("--effect null means no cause at all; leave it out or leave the others out");
+  }
+
+  static Json cause_figures(const phantom::Cause& cause) {
+    Json figures{{"name", cause.name}, {"outside", cause.outside}};
+    figures["parameters"] = cause.values;
+    figures["place"] = cause.place;
+    return figures;
+  }
+
+  Json figures(const fs::path& folder, const phantom::Phantom& phantom) const {
+    Json f;
+    f["case"] = folder.filename().string();
+    f["seed"] = options_.seed;
+    f["causes"] = Json::array();
+    for (const phantom::Cause& cause : phantom.causes) f["causes"].push_back(cause_figures(cause));
+    f["base"] = {{"breast.young_modulus_kpa", phantom.body.breast_kpa},
+                 {"skin.young_modulus_kpa", phantom.body.skin_kpa}};
+    f["side"] = phantom.body.side;
+    f["geometry"] = phantom.body.numbers();
+    f["volume_ml"] = phantom.volume_ml;
+    f["order"] = options_.order;
+    f["nodes"] = phantom.nodes;
+    f["tetrahedra"] = phantom.tetrahedra;
+    for (const phantom::TruthPose& pose : phantom.poses) {
+      const Eigen::VectorXd moved = (pose.x - phantom.rest).rowwise().norm();
+      f["moved_from_rest_mm"][pose.name] = {{"rms", std::sqrt(moved.squaredNorm() / static_cast<double>(moved.size()))},
+                                            {"max", moved.maxCoeff()}};
+    }
+    return f;
+  }
+
+  phantom::PhantomOptions options_;
+  std::vector<std::string> effects_;
+  fs::path answer_;
+};
+
+}  // namespace
+}  // namespace supine::pipeline
+
+int main(int argc, char** argv) {
+  supine::pipeline::PhantomTool tool;
+  return supine::pipeline::tool_main(tool, argc, argv);
+}

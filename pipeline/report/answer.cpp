@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/report/answer.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace supine::pipeline {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string words(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+std::string listed(const Json& names, const char* last) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) text += i + 1 == names.size() ? fmt::format(" {} ", last) : ", ";
+    text += words(names[i].get<std::string>());
+  }
+  return text;
+}
+
+/// A number of @p json under @p key, when it is there and is one.
+double number(const Json& json, const char* key, double otherwise = std::nan("")) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_number() ? found->get<double>() : otherwise;
+}
+
+const Json* candidate(const Json& diagnosis, const std::string& effect) {
+  const auto all = diagnosis.find("candidates");
+  if (all == diagnosis.end()) return nullptr;
+  for (const Json& c : *all)
+    if (c.value("effect", "") == effect) return &c;
+  return nullptr;
+}
+
+Json error_of(const Collected& collected) {
+  struct Row {
+    const char *file, *whose;
+  };
+  for (const Row& row :
+       {Row{"calibrated/comparison.json", "calibrated model"}, {"comparison.json", "model as given"}}) {
+    const Json& found = collected.find(row.file);
+    if (found.is_null()) continue;
+    return {{"rms_mm", found.value("rms_mm", Json())},
+            {"mae_mm", found.value("mae_mm", Json())},
+            {"noise_mm", found.value("noise_mm", Json())},
+            {"of", row.whose},
+            {"file", row.file}};
+  }
+  return nullptr;
+}
+
+/// "lateral edge -1.5 mm (49 cm²)" for the largest few.
+std::string where(const Json& diagnosis) {
+  std::string text;
+  const Json spots = diagnosis.value("hot_spots", Json::array());
+  for (std::size_t s = 0; s < std::min<std::size_t>(3, spots.size()); ++s)
+    text += fmt::format("{}{} {:+.1f} mm ({:.0f} cm²)", s > 0 ? ", " : "", spots[s].value("area", "?"),
+                        number(spots[s], "mean_signed_mm"), number(spots[s], "area_cm2"));
+  return text;
+}
+
+std::string next_measurement(const Json& diagnosis) {
+  const Json next = diagnosis.value("next_measurement", Json::array());
+  if (next.empty()) return "measure another pose";
+  const double separation = number(next[0], "separation", 0);
+  const std::string pair = next[0].value("closest_pair", "");
+  return fmt::format("measure the breast {}{}", next[0].value("measurement", "in another pose"),
+                     separation > 0 && !pair.empty()
+                         ? fmt::format(": it would separate {} by {:.0f} (9 is enough)", words(pair), separation)
+                         : "");
+}
+
+void tell_missing(const Json& diagnosis, const Places& places, Answer& answer) {
+  const std::string effect = diagnosis["missing"][0];
+  const Json* found = candidate(diagnosis, effect);
+  answer.sentence = fmt::format("The model lacks {}", words(effect));
+  if (found != nullptr && std::isfinite(number(*found, "held_out_rms_mm")))
+    answer.sentence += fmt::format(": with it, skin that was not fitted is predicted to {:.2f} mm instead of {:.2f}",
+                                   number(*found, "held_out_rms_mm"), number(diagnosis, "base_held_out_rms_mm"));
+  answer.sentence += ".";
+  answer.next = fmt::format("Add {} to the model and calibrate again.", words(effect));
+  answer.command = fmt::format("build/bin/supine-model add {} {}/model.toml && {}", effect, places.case_name,
+                               places.make("calibrate"));
+}
+
+void tell_diagnosis(const Json& diagnosis, const Places& places, Answer& answer) {
+  const std::string verdict = diagnosis.value("verdict", "");
+  const Json missing = diagnosis.value("missing", Json::array());
+  const std::string why = diagnosis.value("why", "");
+  answer.kind = verdict;
+  if (verdict == "missing" && !missing.empty()) return tell_missing(diagnosis, places, answer);
+  if (verdict == "nothing_missing") {
+    answer.sentence = fmt::format("Nothing is missing: {}.", why);
+    answer.next = "Use the calibrated model.";
+  } else if (verdict == "ambiguous") {
+    answer.sentence = fmt::format("Something is missing, and this scan cannot tell which: {}.", listed(missing, "or"));
+    answer.next = fmt::format("To tell them apart, {}.", next_measurement(diagnosis));
+  } else {
+    answer.kind = "unexplained";
+    answer.sentence = fmt::format("The model is off in a way that no effect of the catalogue explains{}.",
+                                  missing.empty() ? "" : "; closest: " + listed(missing, "or"));
+    answer.next =
+        fmt::format("Look at the map below, check scan and segmentation there, and {}.", next_measurement(diagnosis));
+  }
+}
+
+void add_facts(const Json& diagnosis, const Collected& collected, Answer& answer) {
+  if (const std::string spots = where(diagnosis); !spots.empty())
+    answer.facts.push_back("Where it is off: " + spots + " (plus: the breast reaches further than the model).");
+  Json blind = Json::array();
+  for (const Json& effect : diagnosis.value("cannot_see", Json::array())) blind.push_back(effect.value("effect", "?"));
+  if (!blind.empty()) answer.facts.push_back("This scan could not show: " + listed(blind, "and") + ".");
+  const Json& ladder = collected.first({"ladder/ladder.json", "ladder.json"});
+  if (!ladder.is_object() || !ladder.contains("rungs") || ladder["rungs"].size() < 2) return;
+  const Json &first = ladder["rungs"].front(), &last = ladder["rungs"].back();
+  answer.facts.push_back(
+      fmt::format("Climbing the ladder, the held-out error falls from {:.2f} to {:.2f} mm; noise and mesh alone leave "
+                  "{:.2f}.",
+                  number(first, "held_out_rms_mm"), number(last, "held_out_rms_mm"), number(ladder, "noise_floor_mm")));
+}
+
+}  // namespace
+
+Answer answer_of(const Case& measured, const Collected& collected, const std::vector<Stage>& stages,
+                 const Places& places) {
+  Answer answer;
+  answer.error = error_of(collected);
+  const Json& diagnosis = collected.first({"diagnosis.json", "ladder/diagnosis.json"});
+  if (!diagnosis.is_null()) {
+    tell_diagnosis(diagnosis, places, answer);
+    add_facts(diagnosis, collected, answer);
+    return answer;
+  }
+  const bool has_scan = std::any_of(measured.poses.begin(), measured.poses.end(),
+                                    [](const Pose& pose) { return pose.surface.has_value(); });
+  const auto gap = std::find_if(stages.begin(), stages.end(),
+                                [](const Stage& stage) { return stage.file.empty() && stage.name != "sensitivity"; });
+  if (collected.find("supine.json").is_null()) {
+    answer.kind = "no_shape";
+    answer.sentence = "The supine shape has not been computed yet.";
+    answer.next = gap == stages.end() ? "" : fmt::format("The next step is {}.", gap->name);
+    answer.command = places.make("simulate");
+  } else if (!has_scan) {
+    answer.kind = "no_scan";
+    answer.sentence = "The supine shape is predicted; without a measured surface nobody knows how far it is off.";
+    answer.next = "Measure the patient lying supine and name the scan as `surface` in [pose.supine] of case.toml.";
+  } else {
+    answer.kind = "not_diagnosed";
+    answer.sentence = answer.error.is_null()
+                          ? "The supine shape is predicted, not compared with the measured surface yet."
+                          : fmt::format(
+                                "The {} lies {:.2f} mm RMS from the measured surface; what it lacks has not "
+                                "been asked yet.",
+                                answer.error["of"].get<std::string>(), number(answer.error, "rms_mm"));
+    answer.next = "Ask what is missing.";
+    answer.command = places.make("diagnose");
+  }
+  return answer;
+}
+
+Json answer_json(const Answer& answer) {
+  return {{"kind", answer.kind}, {"sentence", answer.sentence}, {"facts", answer.facts},
+          {"next", answer.next}, {"command", answer.command},   {"error", answer.error}};
+}
+
+}  // namespace supine::pipeline

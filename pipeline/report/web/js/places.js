@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+// Where the error is: areas of the skin, landmarks, hot spots, for every model and pose that was compared.
+"use strict";
+(() => {
+  const { data, el, gap, section, number } = supine;
+
+  // Comparisons there are: {file, model, pose, figures}.
+  const comparisons = () => {
+    const models = [["", "as given"], ["calibrated/", "calibrated"]];
+    const ladder = data.figures[supine.first_file("ladder/ladder.json", "ladder.json")];
+    if (ladder) ladder.rungs.forEach((rung, r) => r && models.push([`ladder/${r}/`, "+ " + supine.words(rung.added)]));
+    return models.flatMap(([folder, model]) => data.case.poses.map(({ name }) => {
+      const file = `${folder}comparison${name === "supine" ? "" : "_" + name}.json`;
+      return { file, model, pose: name, figures: data.figures[file] };
+    })).filter((c) => c.figures);
+  };
+
+  const summary = (all) => {
+    const rows = all.map((c) => ({ model: c.model, pose: c.pose + (data.case.calibrated_poses.includes(c.pose) ? "" : " (not fitted)"), ...c.figures, file: c.file }));
+    const cell = (key, digits = 2) => ({ key, digits, show: (v, row) => supine.shown(row.file, [key], digits, key.includes("signed")) });
+    return supine.table_figure("comparisons", "Distance to the measured surface, mm", [{ title: "model", key: "model" }, { title: "pose", key: "pose" },
+      { title: "RMS", ...cell("rms_mm") }, { title: "MAE", ...cell("mae_mm") }, { title: "MAE, model to scan", ...cell("mae_study_mm") }, { title: "median", ...cell("median_mm") },
+      { title: "95 %", ...cell("p95_mm") }, { title: "largest", ...cell("hausdorff_mm") }, { title: "signed mean", ...cell("mean_signed_mm") },
+      { title: "skin covered", key: "covered_fraction", n: true, show: (v) => number(100 * v, 0) + " %" }], rows);
+  };
+  const areas = (all) => {
+    const shown = all.filter((c) => c.pose === "supine" && c.figures.areas && c.figures.areas.length);
+    if (!shown.length) return "";
+    const names = shown[0].figures.areas.map((a) => a.name);
+    const last = shown[shown.length - 1];
+    const rows = names.map((name) => {
+      const row = { area: name };
+      shown.forEach((c, k) => {
+        const a = c.figures.areas.find((x) => x.name === name) || {};
+        row["signed" + k] = a.mean_signed_mm; row["mae" + k] = a.mae_mm; row.area_cm2 = a.area_cm2;
+      });
+      return row;
+    });
+    const columns = [{ title: "area", key: "area" }, { title: "cm²", key: "area_cm2", digits: 0 }, ...shown.flatMap((c, k) => [
+      { title: `signed mean, ${c.model}`, key: "signed" + k, n: true, show: (v) => supine.signed(v, 2) }, { title: `MAE, ${c.model}`, key: "mae" + k, digits: 2 }])];
+    return [supine.figure("areas-chart", `Mean signed distance per area, ${last.model}, mm`, supine.chart.bars("Mean signed distance per area",
+      last.figures.areas.map((a) => ({ label: a.name, value: a.mean_signed_mm, cls: a.mean_signed_mm > 0 ? "s2" : "s1" })), "mm; right: the breast reaches further than the model", { sign: true, digits: 1 }),
+    { rows: last.figures.areas, columns: [{ title: "area", key: "name" }, { title: "signed mean, mm", key: "mean_signed_mm", digits: 2 }] }),
+    supine.table_figure("areas", "Areas of the skin, supine, mm", columns, rows)];
+  };
+  const landmarks = (all) => {
+    const shown = all.filter((c) => c.figures.landmarks && c.figures.landmarks.length);
+    if (!shown.length) return "";
+    const rows = shown[0].figures.landmarks.map(({ name }) => {
+      const row = { landmark: name };
+      shown.forEach((c, k) => { row["e" + k] = (c.figures.landmarks.find((l) => l.name === name) || {}).error_mm; });
+      return row;
+    });
+    return supine.table_figure("landmarks", "Landmarks: predicted to measured place, mm",
+      [{ title: "landmark", key: "landmark" }, ...shown.map((c, k) => ({ title: `${c.pose}, ${c.model}`, key: "e" + k, digits: 1 }))], rows,
+      { caption: "Not fitted: they show skin that slid along itself, which the distance to a surface cannot." });
+  };
+  const hot_spots = () => {
+    const d = data.figures[supine.first_file("diagnosis.json", "ladder/diagnosis.json")];
+    if (!d || !d.hot_spots || !d.hot_spots.length) return "";
+    return supine.table_figure("hot-spots", "Connected hot spots of the fitted model", [{ title: "area", key: "area" }, { title: "pose", key: "pose" }, { title: "cm²", key: "area_cm2", digits: 0 },
+      { title: "signed mean, mm", key: "mean_signed_mm", n: true, show: (v) => supine.signed(v, 2) }], d.hot_spots);
+  };
+
+  supine.comparisons = comparisons;
+  supine.places = () => {
+    const all = comparisons();
+    if (!all.length) return section("places", "Where the error is", gap("compare"));
+    return section("places", "Where the error is", summary(all), areas(all), landmarks(all), hot_spots());
+  };
+})();

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/left_right_stiffness.h"
+
+#include "meshing/anatomy.h"
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+
+const std::vector<Parameter>& LeftRightStiffness::parameters() const {
+  static const std::vector<Parameter> rows = {
+      {"log_ratio", "1", 0, -2, 2, 0, 0.3, false, "ln of the left breast's stiffness over the right one's"}};
+  return rows;
+}
+
+void LeftRightStiffness::apply(const Scene& scene, std::span<const Dual> values,
+                               const std::map<std::string, std::string>&, Fields<Dual>& fields) const {
+  if (scene.anatomy.breasts.empty()) return;
+  for (Eigen::Index c = 0; c < fields.ln_young.size(); ++c)
+    fields.ln_young[c] += values[0] * (scene.layout.cell_breast[c] == 0 ? 0.5 : -0.5);
+}
+
+}  // namespace supine::simulation

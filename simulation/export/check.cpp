@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/error.h"
+#include "simulation/bulk_laws.h"
+#include "simulation/export/exported_pose.h"
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+namespace {
+
+struct Words {
+  const char* name;
+  std::vector<BulkLaw> bulk;
+  std::vector<SkinLaw> skin;
+  bool many_moduli;
+};
+
+// SOFA's corotational element takes a modulus per tetrahedron, its hyperelastic one a material per object.
+Words words_of(Solver solver, BulkLaw law) {
+  switch (solver) {
+    case Solver::calculix:
+      return {"CalculiX", {BulkLaw::neo_hookean_calculix}, {SkinLaw::neo_hookean}, true};
+    case Solver::febio:
+      return {"FEBio", {BulkLaw::neo_hookean}, {SkinLaw::neo_hookean}, true};
+    case Solver::sofa:
+      break;
+  }
+  return {"SOFA",
+          {BulkLaw::corotational, BulkLaw::corotational_qr, BulkLaw::neo_hookean},
+          {SkinLaw::neo_hookean, SkinLaw::corotational},
+          law != BulkLaw::neo_hookean};
+}
+
+std::string names_of(const std::vector<BulkLaw>& laws) {
+  std::string names;
+  for (const BulkLaw law : laws) names += (names.empty() ? "\"" : " or \"") + name_of(law) + "\"";
+  return names;
+}
+
+[[noreturn]] void refuse(const Words& words, const std::string& term, const std::string& change) {
+  throw InputError(fmt::format("{} cannot express {}; {}", words.name, term, change));
+}
+
+void check_model(const Words& words, const Model& model) {
+  if (std::find(words.bulk.begin(), words.bulk.end(), model.breast.law) == words.bulk.end())
+    refuse(words, fmt::format("breast.law = \"{}\"", name_of(model.breast.law)), "use " + names_of(words.bulk));
+  if (model.skin.young_modulus_kpa.value == 0) return;
+  if (model.skin.compression == Compression::tension_field)
+    refuse(words, "skin.compression = \"tension_field\" (a skin that wrinkles)",
+           "use \"full\" and simulate with it, or leave the skin out (skin.young_modulus_kpa = 0)");
+  if (std::find(words.skin.begin(), words.skin.end(), model.skin.law) == words.skin.end())
+    refuse(words, "skin.law = \"corotational\"", "use \"neo_hookean\"");
+}
+
+void check_fields(const Words& words, const Model& model, const Fields<double>& fields, const std::string& pose) {
+  const auto any = [](const Eigen::VectorXd& column, double null) { return (column.array() != null).any(); };
+  const auto effect = [&](const char* name, const char* what) {
+    refuse(words, fmt::format("the effect {} ({})", name, what),
+           fmt::format("take it out: supine-model remove {} model.toml", name));
+  };
+  if (any(fields.stiffening, 0)) effect("strain_stiffening", "exponential law of the tissue");
+  if (any(fields.fibre_modulus, 0)) effect("fibre_anisotropy", "fibres that carry tension only");
+  if (any(fields.skin_prestretch, 1)) effect("skin_prestretch", "a membrane under tension in the undeformed shape");
+  if (any(fields.skin_stiffening, 0)) effect("skin_stiffening", "exponential law of the skin");
+  if (model.interface.kind == InterfaceKind::sliding && any(fields.interface_friction, 0))
+    effect("friction", "slip counted from the undeformed shape");
+  if (!words.many_moduli && any(fields.ln_young, fields.ln_young[0]))
+    refuse(words, fmt::format("a neo_hookean breast whose modulus varies (pose {})", pose),
+           "use breast.law = \"corotational\", or take out gland_stiffness, tumour_stiffness and stiffness_gradient");
+}
+
+}  // namespace
+
+void check_exportable(Solver solver, const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
+                      const std::vector<PoseLoad>& poses) {
+  const Words words = words_of(solver, model.breast.law);
+  if (mesh.order() != 1)
+    refuse(words, "this mesh: quadratic cells are not written (each program places their points differently)",
+           "mesh with supine-tetrahedralise --order 1");
+  check_model(words, model);
+  const Layout layout = make_layout(mesh, anatomy);
+  for (const PoseLoad& pose : poses)
+    check_fields(words, model, values_of(make_fields(model, {mesh, anatomy, layout, pose.name}, pose.gravity)),
+                 pose.name);
+}
+
+std::string export_extension(Solver solver) {
+  return solver == Solver::calculix ? ".inp" : solver == Solver::febio ? ".feb" : ".scn";
+}
+
+}  // namespace supine::simulation
