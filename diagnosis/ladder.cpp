@@ -68,6 +68,10 @@ Ladder climb(const Subject& subject, const ExamineOptions& options, const Findin
       ladder.stopped = "as many effects were added as are allowed";
       return ladder;
     }
+    if (ladder.rungs.size() > 1 && refit->held_out_rms_mm >= found->figures.held_out_rms_mm) {
+      ladder.stopped = refit->effect + " would be next by its p, but the held-out error does not fall with it";
+      return ladder;
+    }
     const std::string added = refit->effect;
     Subject with = subject;
     with.model = refit->model;

@@ -46,6 +46,11 @@ class PhantomTool : public Tool {
     const fs::path folder = case_folder();
     const fs::path answer = answer_file(folder);
     take_effects();
+    // Known at once, not after the work.
+    for (const fs::path& file : {folder / "case.toml", answer})
+      if (!run.force() && fs::exists(file))
+        throw InputError(
+            fmt::format("output file {} exists; add --force to replace it or choose another with -o", file.string()));
     run.stage("make");
     const phantom::Phantom phantom = phantom::make_phantom(options_);
     run.stage("write");

@@ -60,8 +60,9 @@ TEST(TwoBreastsFit, AreasAreCountedPerSide) {
   EXPECT_EQ(areas.names.size(), 18u);
   EXPECT_EQ(areas.names.front(), "left nipple area");
   for (Eigen::Index p = 0; p < scene.mesh.points.rows(); ++p)
-    if (areas.of_point[p] >= 0)
+    if (areas.of_point[p] >= 0) {
       ASSERT_EQ(areas.of_point[p] < 9, scene.mesh.points(p, 0) >= scene.anatomy.sternum_x_mm) << p;
+    }
 }
 
 }  // namespace

@@ -89,7 +89,7 @@ def check_tool(command, bin_folder):
         text = help_text(bin_folder, tool)
         if text is None:
             return f"{tool} --help fails"
-        for option in re.findall(r"(?<![\w-])(--[a-z][a-z-]*|-o)\b", rest):
+        for option in re.findall(r"(?<![\w-])(--[a-z][a-z0-9-]*|-o)\b", rest):
             if not re.search(rf"(?<![\w-]){re.escape(option)}(?![\w-])", text):
                 return f"{tool} has no option {option}"
     return None

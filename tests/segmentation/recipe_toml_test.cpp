@@ -99,6 +99,20 @@ TEST(RecipeToml, ReadsEveryKindOfStep) {
     side = "left"
     mid_axillary_mm = 70
     inframammary_offset_mm = -5
+    [[step]]
+    do = "otsu"
+    mask = "a"
+    classes = 4
+    first = 2
+    last = 3
+    [[step]]
+    do = "march"
+    mask = "a"
+    seeds_mm = [[1, 2, 3]]
+    speed = "greys"
+    mean = 100
+    sd = 20
+    stop_mm = 30
   )");
   ASSERT_EQ(recipe.steps.size(), std::variant_size_v<Step>);
   for (std::size_t s = 0; s < recipe.steps.size(); ++s) EXPECT_EQ(recipe.steps[s].index(), s);
@@ -114,6 +128,9 @@ TEST(RecipeToml, ReadsEveryKindOfStep) {
   EXPECT_EQ(std::get<Chest>(recipe.steps[13]).options.border, ChestWallOptions::Border::line);
   EXPECT_EQ(std::get<Chest>(recipe.steps[13]).sternum_mm, 3);
   EXPECT_EQ(std::get<Planes>(recipe.steps[14]).mid_axillary.at_mm, 70);
+  EXPECT_EQ(std::get<Otsu>(recipe.steps[15]).last, 3);
+  EXPECT_EQ(std::get<March>(recipe.steps[16]).speed, March::Speed::greys);
+  EXPECT_EQ(std::get<March>(recipe.steps[16]).stop_mm, 30);
   EXPECT_EQ(std::get<Planes>(recipe.steps[14]).inframammary.offset_mm, -5);
   EXPECT_EQ(std::get<Paint>(recipe.steps[11]).over, (std::vector<Tissue>{Tissue::adipose, Tissue::skin}));
 }

@@ -43,10 +43,20 @@ testing::TestScene mixed_box(int n) {
   return scene;
 }
 
+/// The box taken for two breasts, parted in its middle.
+void part(testing::TestScene& scene) {
+  const meshing::Anatomy one = scene.anatomy;
+  const double middle = scene.mesh.points.col(0).mean();
+  scene.anatomy.side = "both";
+  scene.anatomy.breasts = {one, one};
+  scene.anatomy.breast = (scene.mesh.points.col(0).array() < middle).cast<int>();
+}
+
 class NullEffectTest : public ::testing::TestWithParam<const Effect*> {};
 
 TEST_P(NullEffectTest, LeavesTheWholeChainByteForByte) {
-  const testing::TestScene scene = mixed_box(4);
+  testing::TestScene scene = mixed_box(4);
+  if (GetParam()->name() == "left_right_stiffness") part(scene);
   const Model without = testing::soft_model();
   Model with = without;
   with.effects = {null_setting(*GetParam())};
@@ -360,6 +370,17 @@ TEST_P(RefusalTest, NamesTheEffectAndTheReason) {
     EXPECT_NE(std::string(error.what()).find("'" + GetParam().effect + "'"), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find(GetParam().why), std::string::npos) << error.what();
   }
+}
+
+TEST(LeftRightStiffness, NeedsTwoBreasts) {
+  testing::TestScene scene = mixed_box(2);
+  Model model = testing::soft_model();
+  model.effects = {null_setting(*find_effect("left_right_stiffness"))};
+  const Layout one = make_layout(scene.mesh, scene.anatomy);
+  EXPECT_THROW(check_effects_act(model, {scene.mesh, scene.anatomy, one, "supine"}), InputError);
+  part(scene);
+  const Layout two = make_layout(scene.mesh, scene.anatomy);
+  EXPECT_NO_THROW(check_effects_act(model, {scene.mesh, scene.anatomy, two, "supine"}));
 }
 
 const auto keep = [](Model&) {};

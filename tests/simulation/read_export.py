@@ -179,26 +179,31 @@ def read_sofa(root):
     return model
 
 
+def square(number):
+    return math.floor(number / 15)
+
+
 def faces_at(model, points):
     """Barycentric weights of points that lie in tetrahedra, as BarycentricMapping finds them."""
-    found = []
-    boxes = []
+    boxes = {}
     for nodes, *_ in model.cells:
         if nodes[3] in model.skin:
             continue
         corners = [model.points[n] for n in nodes]
-        boxes.append((nodes, corners, [min(c) - 1e-6 for c in zip(*corners)], [max(c) + 1e-6 for c in zip(*corners)]))
-    known = {}
+        reach = [range(square(min(c) - 1e-6), square(max(c) + 1e-6) + 1) for c in zip(*corners)]
+        entry = nodes, corners[0], inverse(edges(corners))
+        for key in ((i, j, k) for i in reach[0] for j in reach[1] for k in reach[2]):
+            boxes.setdefault(key, []).append(entry)
+    found, known = [], {}
     for p in points:
         key = tuple(round(x, 6) for x in p)
         if key not in known:
             best = None
-            for nodes, corners, low, high in boxes:
-                if all(l <= x <= h for l, x, h in zip(low, p, high)):
-                    local = [dot(row, sub(p, corners[0])) for row in inverse(edges(corners))]
-                    weights = [1 - sum(local)] + local
-                    if best is None or min(weights) > min(w for _, w in best):
-                        best = list(zip(nodes, weights))
+            for nodes, origin, to_local in boxes.get(tuple(square(x) for x in p), []):
+                local = [dot(row, sub(p, origin)) for row in to_local]
+                weights = [1 - sum(local)] + local
+                if best is None or min(weights) > min(w for _, w in best):
+                    best = list(zip(nodes, weights))
             assert best is not None and min(w for _, w in best) > -1e-6, f"a spring at {p} hangs on nothing"
             known[key] = best
         found.append(known[key])
