@@ -67,10 +67,8 @@ NumericalError measure_numerical_error(const calibration::Scene& scene, const si
 #pragma omp parallel for schedule(static, 1)
   for (int k = 0; k < 2; ++k) {
     try {
-      meshing::TetMesh mesh;
-#pragma omp critical(supine_other_mesh)  // TetGen keeps globals
-      mesh = k == 0 ? other_mesh(*scene.mesh, *scene.anatomy, edge_share)
-                    : coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share);
+      const meshing::TetMesh mesh = k == 0 ? other_mesh(*scene.mesh, *scene.anatomy, edge_share)
+                                           : coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share);
       change[k] = change_on(scene, mesh, model, fit.residuals);
     } catch (const std::exception& failure) {
       reason[k] = std::string(k == 0 ? "finer" : "coarser") + " mesh: " + failure.what();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "common/shared_random.h"
 
 namespace supine::meshing {
 
@@ -90,6 +91,7 @@ Eigen::VectorXd SplineFit::solve() const {
     }
   }
   upper.makeCompressed();
+  const std::lock_guard alone(shared_random);  // CHOLMOD orders with METIS
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Upper> solver(upper);
   if (solver.info() != Eigen::Success) {
     throw NumericalFailure("the distance field of the muscle could not be fitted: the normal equations are singular");

@@ -13,6 +13,7 @@
 #include <tetgen.h>
 
 #include "common/error.h"
+#include "common/shared_random.h"
 #include "meshing/topology.h"
 
 namespace supine::meshing {
@@ -102,6 +103,7 @@ TetgenResult call_tetgen(const reconstruction::Surface& surface, const TetgenBou
       fmt::format("pYAQq{:.6g}/{:.6g}a{:.9f}O7/7", bounds.radius_edge, bounds.min_dihedral_deg, bounds.max_volume_mm3);
   if (sizes) switches += "m";
   try {
+    const std::lock_guard alone(shared_random);
     tetrahedralize(switches.data(), &in, &out, nullptr, sizes ? &background : nullptr);
   } catch (int error) {
     throw NumericalFailure(

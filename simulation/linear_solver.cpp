@@ -5,10 +5,10 @@
 
 #include <Eigen/CholmodSupport>
 #include <Eigen/UmfPackSupport>
-#include <mutex>
 #include <vector>
 
 #include "common/error.h"
+#include "common/shared_random.h"
 #ifdef SUPINE_WITH_PETSC
 #include "simulation/multigrid_solver.h"
 #endif
@@ -23,10 +23,6 @@ namespace supine::simulation {
 namespace {
 
 void use_one_blas_thread() { openblas_set_num_threads(1); }
-
-/// METIS draws from the C library's one rand(), seeded anew by every call: two at a time would draw from each other's
-/// numbers, and orderings (so the last digits of every solve) would depend on chance.
-std::mutex metis_at_work;
 
 /// CHOLMOD asks for four threads whatever OMP_NUM_THREADS says; on two cores they cost more than they give.
 class SingleThreaded {
@@ -105,7 +101,7 @@ std::vector<int> node_ordering(const SparseMatrix& matrix, cholmod_common& commo
 CholeskySolver::CholeskySolver(const SparseMatrix& pattern) : state_(std::make_unique<State>()) {
   use_one_blas_thread();
   const SingleThreaded guard;
-  const std::lock_guard alone(metis_at_work);
+  const std::lock_guard alone(shared_random);
   std::vector<int> order = node_ordering(pattern, state_->common);
   state_->common.nmethods = 1;
   state_->common.method[0].ordering = CHOLMOD_GIVEN;
@@ -165,7 +161,7 @@ LuSolver::LuSolver(const SparseMatrix& pattern) : state_(std::make_unique<State>
   state_->matrix = pattern;
   // By the pattern alone: what comes out later must not depend on the numbers of the first matrix.
   state_->matrix.coeffs() = 1;
-  const std::lock_guard alone(metis_at_work);
+  const std::lock_guard alone(shared_random);
   state_->solver.analyzePattern(state_->matrix);
 }
 
