@@ -18,6 +18,7 @@ using calibration::FreeParameters;
 using simulation::Parameter;
 
 constexpr int first_steps = 3;
+constexpr double place_start_sd = 1.5;  // how far to either side of its usual place an effect is looked for
 constexpr double hopeless_share = 0.6;  // of the best gain: what is behind that after the first steps is left there
 
 double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
@@ -81,6 +82,16 @@ Job prepared(const RefitProblem& problem, const Candidate& candidate, const Scor
   job.starts.push_back(start_at(*job.parameters, base, problem.base->fit.u, step));
   if (differ && candidate.parameters.size() == 1)
     job.starts.push_back(start_at(*job.parameters, base, problem.base->fit.u, usual));
+  // Without strength a place moves nothing, and at the wrong place strength only does harm: look on either side too.
+  for (const Parameter& row : simulation::find_effect(candidate.effect)->parameters()) {
+    const bool size = row.lower >= 0;  // no place
+    if (size || is_strength(*simulation::find_effect(candidate.effect), row)) continue;
+    for (const double side : {-place_start_sd, place_start_sd}) {
+      auto elsewhere = usual;
+      elsewhere.emplace_back(candidate.effect + "." + row.name, row.median + side * row.log_sd);
+      job.starts.push_back(start_at(*job.parameters, base, problem.base->fit.u, elsewhere));
+    }
+  }
   return job;
 }
 

@@ -50,7 +50,7 @@ const std::vector<Parameter>& Ligament::parameters() const {
       {"stiffness_kpa_per_mm", "kPa/mm", 0, 0, 4, 0.4, 1.0, true,
        "tangential and normal stiffness per area of the ring"},
       {"offset_mm", "mm", 0, -30, 30, 0, 4, false, "distance of the ring's middle from the foot, outward positive"},
-      {"width_mm", "mm", 12, 1, 60, 12, 0.4, false, "width of the ring"}};
+      {"width_mm", "mm", 12, 1, 60, 12, 4, false, "width of the ring"}};
   return rows;
 }
 

@@ -122,7 +122,7 @@ TEST_F(NullTwin, NoHotSpotWithoutDistance) {
 }
 
 TEST(TwinDiagnosis, ALigamentIsAmongWhatIsNamed) {
-  const Twin twin({with("ligament", "stiffness_kpa_per_mm", 0.4), noise_mm});
+  const Twin twin({with("ligament", "stiffness_kpa_per_mm", 2.0), noise_mm});
   const auto found = findings_of(twin, 3);
   EXPECT_TRUE(found->diagnosis.verdict == Verdict::missing || found->diagnosis.verdict == Verdict::ambiguous)
       << found->diagnosis.why;
