@@ -5,9 +5,9 @@
 
 namespace supine {
 
-/// Held around calls of libraries that draw from the C library's one rand() (METIS, TetGen). Each seeds it anew by every
-/// call; two at a time would draw from each other's numbers, and orderings and meshes, so the last digits of every
-/// answer, would depend on chance.
+/// Held around calls of libraries that draw from the C library's one rand() (METIS, TetGen). Each seeds it anew by
+/// every call; two at a time would draw from each other's numbers, and orderings and meshes, so the last digits of
+/// every answer, would depend on chance.
 inline std::mutex shared_random;
 
 }  // namespace supine

@@ -16,13 +16,14 @@ namespace supine::meshing {
 class MuscleDistance {
  public:
   struct Sample {
-    double value_mm;             ///< φ
-    Eigen::Vector3d gradient;    ///< ∇φ, close to unit length near the sheet
-    Eigen::Matrix3d hessian;     ///< ∇∇φ, 1/mm
+    double value_mm;           ///< φ
+    Eigen::Vector3d gradient;  ///< ∇φ, close to unit length near the sheet
+    Eigen::Matrix3d hessian;   ///< ∇∇φ, 1/mm
   };
 
   /// @param sheet  breast-facing muscle sheet (open), normals toward the breast
-  /// @param reach  box (rows: lower and upper corner, mm) in which φ is wanted; it is widened to hold the sheet and 40 mm around it
+  /// @param reach  box (rows: lower and upper corner, mm) in which φ is wanted; it is widened to hold the sheet and 40
+  /// mm around it
   /// @throws InputError  sheet with fewer than 10 triangles or of no area
   MuscleDistance(const reconstruction::Surface& sheet, const Eigen::Matrix<double, 2, 3>& reach);
 

@@ -13,13 +13,13 @@ namespace supine::meshing {
 /// 01 12 02 03 13 23). Boundary faces: 3 or 6 nodes (corners, then the middles of 01 12 20), counter-clockwise
 /// seen from outside; together they are the whole boundary.
 struct TetMesh {
-  Points points;             ///< #N by 3
-  Indices cells;             ///< #C by 4 or 10; positive volume
-  Eigen::VectorXi tissue;    ///< #C, values of segmentation::Tissue: the tissue with the largest fraction
-  Table fraction;            ///< #C by segmentation::tissue_count, rows sum to 1 over the meshed tissues
-  Indices faces;             ///< #F by 3 or 6
-  Eigen::VectorXi region;    ///< #F, values of reconstruction::Region, never none
-  Eigen::VectorXi face_cell; ///< #F, the cell the face belongs to
+  Points points;                   ///< #N by 3
+  Indices cells;                   ///< #C by 4 or 10; positive volume
+  Eigen::VectorXi tissue;          ///< #C, values of segmentation::Tissue: the tissue with the largest fraction
+  Table fraction;                  ///< #C by segmentation::tissue_count, rows sum to 1 over the meshed tissues
+  Indices faces;                   ///< #F by 3 or 6
+  Eigen::VectorXi region;          ///< #F, values of reconstruction::Region, never none
+  Eigen::VectorXi face_cell;       ///< #F, the cell the face belongs to
   reconstruction::Surface muscle;  ///< the breast-facing muscle sheet, normals toward the breast; travels with the mesh
 
   int order() const { return cells.cols() == 10 ? 2 : 1; }

@@ -36,7 +36,8 @@ struct MeasuredCase {
 
 /// Reads and checks all of it, and solves the model as given once, because only a predicted skin tells which side of a
 /// scan is outside and whether it lies at the body.
-/// @throws InputError  a fitted pose without a surface; no interface; side = "both" without two breasts; a scan that is not at the body;
+/// @throws InputError  a fitted pose without a surface; no interface; side = "both" without two breasts; a scan that is
+/// not at the body;
 ///   effects that can change nothing
 /// @throws NumericalFailure  no equilibrium with the model as given
 std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const std::filesystem::path& folder,

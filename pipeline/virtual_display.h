@@ -3,9 +3,9 @@
 
 namespace supine::pipeline {
 
-/// A display without a screen, for as long as the object lives: starts Xvfb and points DISPLAY at it. Debian's VTK draws
-/// through X alone; with a server of its own a picture comes out the same on a desktop, over ssh and in a container.
-/// One at a time in a process.
+/// A display without a screen, for as long as the object lives: starts Xvfb and points DISPLAY at it. Debian's VTK
+/// draws through X alone; with a server of its own a picture comes out the same on a desktop, over ssh and in a
+/// container. One at a time in a process.
 class VirtualDisplay {
  public:
   /// @throws InputError  when Xvfb is not installed or does not start

@@ -14,8 +14,8 @@ class LinearSolversTest : public ::testing::Test {
  protected:
   LinearSolversTest() : scene(testing::dome_scene()), model(testing::soft_model()) {
     mechanics = std::make_unique<Mechanics>(scene.mesh, scene.anatomy, model);
-    mechanics->set_fields(values_of(
-        make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics->layout(), "prone"}, {0, -1, 0})));
+    mechanics->set_fields(
+        values_of(make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics->layout(), "prone"}, {0, -1, 0})));
     sums = std::make_unique<Sums>(mechanics->pattern());
     Points x = scene.mesh.points;
     x.col(1) *= 1.05;
