@@ -4,7 +4,7 @@
 # On a null (neo-Hookean, made by an independent program), and on data made with the study's own corotational law, at
 # 0.8 and 40 kPa: with its own 22.72 and even 0.5 that law has no equilibrium on this shape.
 # CMA-ES stops, as in the study, when the MAE is under a threshold: 1.02 times that of the least-squares answer.
-# Then the map of the error (ridge.png) with every answer on it.
+# Then the map of the error (ridge.png) with every answer on it. Goes on where an earlier call stopped.
 #
 #   bench/study_table1.sh DATA/hidden-open WORK [BIN] [SEEDS] [SEEDS_OWN]
 source "$(dirname "$0")/study_common.sh"
@@ -24,6 +24,9 @@ tool simulate "$own" "$mesh" --model "$work/own_truth.toml" --pose supine -o "$w
 tool compare "$own" "$work/own_run/supine.vtu" -o "$work/own_run"
 cp "$work/own_run/comparison.vtp" "$own/supine_own.vtp"
 sed -i 's/^surface = "supine.ply"/surface = "supine_own.vtp"/' "$own/case.toml"
+
+# calibrated OUT ARGUMENTS…
+calibrated() { [ -f "$1/calibration.json" ] || tool calibrate "${@:2}" --threads 1 -o "$1"; }
 
 echo "Mesh: $(size_of "$mesh"); one thread"
 echo
@@ -48,15 +51,15 @@ for kind in null own; do
     base=$work/table1/$kind-$eb-$sb
     mkdir -p "$base"
     with_moduli "$folder/model.toml" "$base/start.toml" "$eb" "$sb" "$es" "$ss"
-    if ! tool calibrate "$folder" "$mesh" --model "$base/start.toml" --no-priors --threads 1 -o "$base/ls"; then
+    if ! calibrated "$base/ls" "$folder" "$mesh" --model "$base/start.toml" --no-priors; then
       echo "| $kind | $name | | | no equilibrium at the start | | | | | |"
       continue
     fi
     threshold=$(jq '[.mae_study_mm * 1.02, 0.05] | max' "$base/ls/calibration.json")
     files=()
     for seed in $(seq "$count"); do
-      tool calibrate "$folder" "$mesh" --model "$base/start.toml" --method cmaes --seed "$seed" --until-mae "$threshold" \
-        --threads 1 -o "$base/cma$seed"
+      calibrated "$base/cma$seed" "$folder" "$mesh" --model "$base/start.toml" --method cmaes --seed "$seed" \
+        --until-mae "$threshold"
       files+=("$base/cma$seed/calibration.json")
     done
     row $kind "$name" cmaes "$threshold" "${files[@]}"

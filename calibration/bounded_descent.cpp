@@ -7,6 +7,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "calibration/chain_cost.h"
@@ -154,6 +155,8 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const FitOp
              const std::vector<bool>& held, const Linearisation* linearisation, bool rough, Fit& fit) {
   ActiveSet active(parameters, held);
   if (active.moving().empty()) throw InputError("every parameter is held: nothing to fit");
+  if (std::none_of(fit.mask.begin(), fit.mask.end(), [](const auto& used) { return used.any(); }))
+    throw NumericalFailure("no point of a scan lies over the skin as the model has it: nothing to fit to");
   ChainCost cost(evaluator, parameters, options, fit.mask, fit, start);
   cost.warm_start(fit.u, fit.prediction, linearisation);
   Watch watch(cost, active, rough ? rough_sd : settled_sd);
@@ -162,7 +165,7 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const FitOp
   // A round ends at a bound or settled; each coordinate comes and goes once, then it is given up.
   for (Eigen::Index round = 0; round < 2 * parameters.size() + 2; ++round) {
     const ceres::Solver::Summary summary = solve(cost, parameters, active, watch, left, u);
-    if (cost.accepted().jacobian.size() == 0) throw NumericalFailure("no equilibrium at the start of the fit");
+    assert(cost.accepted().jacobian.size() > 0);  // the start is in range and its prediction known
     u = cost.accepted().u;
     left -= std::max(0, static_cast<int>(summary.iterations.size()) - 1);
     fit.converged = watch.settled() || summary.termination_type == ceres::CONVERGENCE;

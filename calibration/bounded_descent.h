@@ -21,7 +21,8 @@ namespace supine::calibration {
 /// @param held   coordinates that stay where they are; empty = none
 /// @param linearisation  of the prediction, to start trials from; nullptr = none is known
 /// @param fit    in: u, prediction, mask; out: all of it
-/// @throws InputError  every coordinate is held
+/// @throws InputError        every coordinate is held
+/// @throws NumericalFailure  the mask leaves no point
 void descend(Evaluator& evaluator, const FreeParameters& parameters, const FitOptions& options, int start,
              const std::vector<bool>& held, const Linearisation* linearisation, bool rough, Fit& fit);
 

@@ -99,7 +99,7 @@ Fit fit_least_squares(Evaluator& evaluator, const FreeParameters& parameters, co
     if (fit.u.size() > 0 && (best.u.size() == 0 || fit.cost < best.cost)) best = std::move(fit);
   }
   if (best.u.size() == 0)
-    throw NumericalFailure("calibration: no equilibrium at the model's values, nor from any other start: " + reason);
+    throw NumericalFailure("calibration: no fit from the model's values, nor from any other start: " + reason);
   best.history = std::move(log.history), best.start_costs = std::move(log.start_costs);
   best.evaluations = log.evaluations, best.failed = log.failed, best.iterations = log.iterations;
   return best;

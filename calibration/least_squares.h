@@ -57,7 +57,7 @@ struct Fit {
 /// Which scan points take part is decided at the start of a descent and again at its end, until 99 % of them stay.
 /// A trial without equilibrium is a rejected step. Each run starts at the last accepted shape, moved along the
 /// sensitivities.
-/// @throws NumericalFailure  no equilibrium at any start
+/// @throws NumericalFailure  no equilibrium, or no scan point over the skin, at any start
 Fit fit_least_squares(Evaluator& evaluator, const FreeParameters& parameters, const FitOptions& options);
 
 /// The same for a fixed set of points and some coordinates held: for profiles. The history is left empty.

@@ -15,7 +15,6 @@ class ScanMotion {
   /// @param scan    all points of the scan as given, #P by 3, mm
   ScanMotion(const Eigen::VectorXd& motion, const Points& scan);
 
-  bool is_none() const { return none_; }
   /// Points of the scan as given → where they belong.
   Points corrected(const Points& given) const;
   /// Points in the frame of the image → in that of the scan as given; the inverse of corrected().

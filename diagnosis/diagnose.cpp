@@ -59,8 +59,12 @@ double p_of(const ScoreTable& table) {
 /// Whether the p of the effect is proof enough: held-out blocks of skin cannot show what lies under one block alone.
 bool is_sure(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
   if (refit.bic < rules.bic || p_of_effect(table, refit.effect) > rules.sure_p || !leaves_out_null(refit)) return false;
-  const bool poses = !refit.pose_rms_mm.empty() && refit.pose_rms_mm.size() == base.pose_rms_mm.size();
-  return !poses || pose_rms(refit.pose_rms_mm) <= (1 + rules.pose_rise) * pose_rms(base.pose_rms_mm);
+  // A scan that lies elsewhere says nothing of where another one lies.
+  const bool poses = refit.effect != "misregistration" && !refit.pose_rms_mm.empty() &&
+                     refit.pose_rms_mm.size() == base.pose_rms_mm.size();
+  if (!poses) return true;
+  const double noise = base.noise_mm * base.noise_mm, before = std::pow(pose_rms(base.pose_rms_mm), 2) - noise;
+  return std::pow(pose_rms(refit.pose_rms_mm), 2) - noise <= (1 - rules.pose_excess_share) * before;
 }
 
 /// What counts, best first, and what comes near the best of it whether it would count by itself or not.

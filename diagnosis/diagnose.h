@@ -18,15 +18,15 @@ bool is_measurement_effect(const std::string& effect);
 
 /// Bounds of the verdict (docs/diagnosis.md).
 struct VerdictRules {
-  double p_value = 0.05;         ///< of the best candidate, over the whole catalogue
-  double held_out_share = 0.05;  ///< the held-out RMS must fall by this share
-  double held_out_mm = 0.05;     ///< and by this much
-  double excess_share = 0.3;     ///< or by this share of what it has above the noise, in squares
-  double sure_p = 0.01;          ///< of an effect that counts by itself, whatever the held-out blocks show
-  double pose_rise = 0.02;       ///< unless poses that were not fitted are predicted worse by more than this share
-  double bic = 6;                ///< candidates within this of the best cannot be told from it, times the misfit left
-  double pose_share = 0.05;      ///< and neither can those that predict a held-out pose better, or within this share
-  double lack_of_fit_p = 0.01;   ///< what is left after the best is more than errors
+  double p_value = 0.05;           ///< of the best candidate, over the whole catalogue
+  double held_out_share = 0.05;    ///< the held-out RMS must fall by this share
+  double held_out_mm = 0.05;       ///< and by this much
+  double excess_share = 0.3;       ///< or by this share of what it has above the noise, in squares
+  double sure_p = 0.01;            ///< of an effect that counts by itself, whatever the held-out blocks show
+  double pose_excess_share = 0.1;  ///< if poses that were not fitted lose this share of what they have above the noise
+  double bic = 6;                  ///< candidates within this of the best cannot be told from it, times the misfit left
+  double pose_share = 0.05;        ///< and neither can those that predict a held-out pose better, or within this share
+  double lack_of_fit_p = 0.01;     ///< what is left after the best is more than errors
   double lack_of_fit_misfit = 1.6;  ///< and this many times what errors would leave on the mean
 };
 
@@ -55,8 +55,8 @@ struct Diagnosis {
 /// nothing_missing  no score that chance would not give (p), or nothing that lowers the held-out error
 /// missing          one refit counts and no other comes near. A refit counts that beats its penalty and lowers the
 ///                  held-out error; or one that beats it by `bic`, whose own p is below sure_p, whose interval leaves
-///                  out its null and that does not spoil a pose that was not fitted: blocks of skin that are predicted
-///                  without themselves cannot show what lies under one of them alone
+///                  out its null and that lowers the error of a pose that was not fitted, where there is one: blocks of
+///                  skin that are predicted without themselves cannot show what lies under one of them alone
 /// ambiguous        several do, measurement effects first
 /// unexplained      the residual is real, and either nothing lowers the held-out error or the best leaves much of it
 /// @param refits  best first; of them only finished ones count

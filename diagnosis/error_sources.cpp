@@ -26,12 +26,6 @@ Eigen::VectorXd noise_of(const Residuals& residuals) {
   return noise;
 }
 
-double tolerance_of(const CandidateParameter& parameter, const std::string& effect, const Tolerances& t) {
-  if (effect == "misregistration") return parameter.unit == "rad" ? t.registration_rad : t.registration_mm;
-  if (effect == "segmentation_offset") return t.segmentation_mm;
-  return t.incompressibility;
-}
-
 std::string source_of(const std::string& effect) {
   if (effect == "misregistration") return "registration";
   if (effect == "segmentation_offset") return "segmentation";
@@ -41,6 +35,12 @@ std::string source_of(const std::string& effect) {
 
 }  // namespace
 
+double tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& t) {
+  if (effect == "misregistration") return unit == "rad" ? t.registration_rad : t.registration_mm;
+  if (effect == "segmentation_offset") return t.segmentation_mm;
+  return effect == "incompressibility" ? t.incompressibility : 0;
+}
+
 void set_numerical(const NumericalError& numerical, const Tolerances& tolerances, ErrorSources& sources) {
   std::erase_if(sources.modes, [](const ErrorMode& mode) { return mode.source == "mesh"; });
   sources.mean_mm = tolerances.correction * numerical.finer_mm;
@@ -48,6 +48,12 @@ void set_numerical(const NumericalError& numerical, const Tolerances& tolerances
   sources.modes.push_back({"mesh", numerical.coarser_mm});
   sources.spread_mm = numerical.spread_mm;
   sources.length_mm = numerical.length_mm;
+}
+
+ErrorSources without_tolerance_for(const std::string& effect, const ErrorSources& sources) {
+  ErrorSources rest = sources;
+  std::erase_if(rest.modes, [own = source_of(effect)](const ErrorMode& mode) { return mode.source == own; });
+  return rest;
 }
 
 ErrorSources error_sources(const Residuals& residuals, const std::vector<Candidate>& candidates,
@@ -61,7 +67,7 @@ ErrorSources error_sources(const Residuals& residuals, const std::vector<Candida
   for (const Candidate& candidate : candidates) {
     const std::string source = source_of(candidate.effect);
     for (std::size_t k = 0; !source.empty() && k < candidate.parameters.size(); ++k)
-      sources.modes.push_back({source, tolerance_of(candidate.parameters[k], candidate.effect, tolerances) *
+      sources.modes.push_back({source, tolerance_for(candidate.effect, candidate.parameters[k].unit, tolerances) *
                                            candidate.slope.col(static_cast<Eigen::Index>(k))});
   }
   if (numerical != nullptr) set_numerical(*numerical, tolerances, sources);

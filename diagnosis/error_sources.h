@@ -21,6 +21,9 @@ struct Tolerances {
   double correction = 1;      ///< of the finer mesh's change is added to the distances, give or take the same
 };
 
+/// How well a parameter of an effect is known to be at its null, 1 sigma; 0 for effects that are no source of error.
+double tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& tolerances);
+
 /// A shape the distances may take although nothing is missing, as large as one standard deviation.
 struct ErrorMode {
   std::string source;  ///< registration, segmentation, numerical (incompressibility), mesh
@@ -38,6 +41,10 @@ struct ErrorSources {
 
 /// Puts what the mesh does into the sources: mean, modes (one per other mesh), spread.
 void set_numerical(const NumericalError& numerical, const Tolerances& tolerances, ErrorSources& sources);
+
+/// The sources for a fit with @p effect free: without the tolerance for that very thing, under which the fit would stop
+/// short of its size.
+ErrorSources without_tolerance_for(const std::string& effect, const ErrorSources& sources);
 
 /// @param numerical  nullptr: no mesh was tried; then spread and length are those of @p fallback, fitted to the
 ///   residual itself, and smooth effects count for little

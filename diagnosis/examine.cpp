@@ -102,8 +102,13 @@ std::vector<std::string> worth_refitting(const ScoreTable& table, std::size_t co
 
 RefitProblem refit_problem(const Subject& subject, const Findings& found,
                            const std::function<void(const std::string&)>& progress) {
-  return {subject.fitted, subject.whole, &found.model,
-          &found.base,    &found.metric, std::log(found.whitening.effective_points()),
+  return {subject.fitted,
+          subject.whole,
+          &found.model,
+          &found.base,
+          &found.metric,
+          &found.sources,
+          std::log(found.whitening.effective_points()),
           progress};
 }
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "common/error.h"
 #include "diagnosis/diagnose.h"
@@ -20,23 +19,24 @@ constexpr double level = 3.841459;  // of χ² with one degree of freedom, 95 %
 constexpr int trials = 3;           // values tried on each side
 constexpr double near_enough = 0.2;
 
-/// Sources and whitening with the mesh's error at the model with the effect.
+/// Sources and whitening without the tolerance for the effect, the mesh's error at the model with it.
 struct Errors {
   ErrorSources sources;
   Whitening whitening;
 };
 
-std::optional<Errors> measured_again(const calibration::Scene& scene, const ErrorSources& sources,
-                                     const Tolerances& tolerances, const Refit& refit) {
-  try {
-    const NumericalError numerical = measure_numerical_error(scene, refit.model, refit.fit.fit);
-    Errors errors{sources, {}};
-    set_numerical(numerical, tolerances, errors.sources);
-    errors.whitening = Whitening::of(refit.fit.fit.residuals, errors.sources);
-    return errors;
-  } catch (const NumericalFailure&) {
-    return {};  // no other mesh carries this model: what was measured without the effect has to do
+Errors errors_with(const calibration::Scene& scene, const ErrorSources& sources, bool other_mesh,
+                   const Tolerances& tolerances, const Refit& refit) {
+  Errors errors{without_tolerance_for(refit.effect, sources), {}};
+  if (other_mesh) {
+    try {
+      set_numerical(measure_numerical_error(scene, refit.model, refit.fit.fit), tolerances, errors.sources);
+    } catch (const NumericalFailure&) {
+      // No other mesh carries this model: what was measured without the effect has to do.
+    }
   }
+  errors.whitening = Whitening::of(refit.fit.fit.residuals, errors.sources);
+  return errors;
 }
 
 /// The interval widened by an error of @p sd of the value, in quadrature on each side, cut at the range.
@@ -130,17 +130,14 @@ FittedParameter profiled(const calibration::Scene& scene, const Metric& metric, 
 
 void settle(const calibration::Scene& scene, const ErrorSources& sources, bool other_mesh, const Tolerances& tolerances,
             const Metric& metric, Refit& refit) {
-  std::optional<Errors> errors;
-  if (other_mesh) errors = measured_again(scene, sources, tolerances, refit);
+  const Errors errors = errors_with(scene, sources, other_mesh, tolerances, refit);
   Metric now = metric;
-  if (errors) now.whitening = &errors->whitening, now.mean_mm = errors->sources.mean_mm;
+  now.whitening = &errors.whitening, now.mean_mm = errors.sources.mean_mm;
   const FreeParameters parameters(refit.model);
   WeightedFit fit = refit.fit;
-  if (errors) {
-    calibration::Evaluator evaluator(scene, refit.model);
-    weigh_again(parameters, now, fit);
-    descend(evaluator, parameters, now, DescentOptions{}, fit);
-  }
+  calibration::Evaluator evaluator(scene, refit.model);
+  weigh_again(parameters, now, fit);
+  descend(evaluator, parameters, now, DescentOptions{}, fit);
   refit.parameters = linear_intervals(refit.effect, fit, parameters, now);
   std::vector<Eigen::Index> strengths;
   for (Eigen::Index i = 0; i < parameters.size(); ++i) {
@@ -152,7 +149,8 @@ void settle(const calibration::Scene& scene, const ErrorSources& sources, bool o
       if (strengths.size() == 1 && p.name == parameters.names()[static_cast<std::size_t>(i)])
         p = profiled(scene, now, parameters, fit, i, p);
     const double size = std::abs(p.value - simulation::find_parameter(p.name)->null);
-    if (!is_measurement_effect(refit.effect)) widen(tolerances.effect_form * size, p);
+    const double form = is_measurement_effect(refit.effect) ? 0 : tolerances.effect_form * size;
+    widen(std::hypot(form, tolerance_for(refit.effect, p.unit, tolerances)), p);
   }
 }
 

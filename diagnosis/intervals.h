@@ -11,8 +11,8 @@ namespace supine::diagnosis {
 /// of the effect as well, and the refit goes on from where it is under that error. The interval of a strength without a
 /// prior is a profile: the values at which F, everything else fitted again, is 3.84 · max(1, misfit) above its least;
 /// cut at the range. It need not lie evenly, and may be open to the end where ever more of the effect changes nothing.
-/// Tissue effects are widened by Tolerances::effect_form, in quadrature. Other parameters, and effects of several
-/// strengths, get linear_intervals().
+/// Tissue effects are widened by Tolerances::effect_form, sources of error by their tolerance, in quadrature. Other
+/// parameters, and effects of several strengths, get linear_intervals().
 /// @param sources     of the base model's examination
 /// @param other_mesh  whether the mesh's error is to be measured
 void settle(const calibration::Scene& scene, const ErrorSources& sources, bool other_mesh, const Tolerances& tolerances,

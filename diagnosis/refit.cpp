@@ -37,7 +37,10 @@ struct Job {
   std::optional<FreeParameters> parameters;
   std::unique_ptr<calibration::Evaluator> evaluator;
   std::vector<Eigen::VectorXd> starts;
+  Whitening whitening;  // without the tolerance for the effect itself
+  Metric metric;        // of that whitening
   WeightedFit fit;
+  double objective = 0;  // F of the fit under all errors, as the base model's
   bool solved = false, finished = false;
   int freedom = 0;
 };
@@ -95,38 +98,49 @@ Job prepared(const RefitProblem& problem, const Candidate& candidate, const Scor
   return job;
 }
 
+void weigh_under_all_errors(const RefitProblem& problem, Job& job) {
+  WeightedFit fit = job.fit;
+  weigh_again(*job.parameters, *problem.metric, fit);
+  job.objective = fit.objective;
+}
+
 /// The better of the starts, and a few steps from there.
 void begin(const RefitProblem& problem, Job& job) {
+  job.whitening = Whitening::of(problem.base->fit.residuals, without_tolerance_for(job.effect, *problem.sources));
+  job.metric = *problem.metric;
+  job.metric.whitening = &job.whitening;
   job.evaluator = std::make_unique<calibration::Evaluator>(problem.scene, job.model);
   const simulation::ChainSolution& near = problem.base->fit.prediction.solution;
   for (const Eigen::VectorXd& u : job.starts) {
     try {
-      WeightedFit trial = weigh(*job.evaluator, *job.parameters, *problem.metric, u, &near);
+      WeightedFit trial = weigh(*job.evaluator, *job.parameters, job.metric, u, &near);
       DescentOptions few;
       few.max_iterations = job.starts.size() > 1 ? 2 : first_steps;
-      descend(*job.evaluator, *job.parameters, *problem.metric, few, trial);
+      descend(*job.evaluator, *job.parameters, job.metric, few, trial);
       if (!job.solved || trial.objective < job.fit.objective) job.fit = std::move(trial);
       job.solved = true;
     } catch (const NumericalFailure&) {
       // No equilibrium at that size; another start may have one.
     }
   }
+  if (job.solved) weigh_under_all_errors(problem, job);
 }
 
 void finish(const RefitProblem& problem, Job& job) {
-  descend(*job.evaluator, *job.parameters, *problem.metric, DescentOptions{}, job.fit);
+  descend(*job.evaluator, *job.parameters, job.metric, DescentOptions{}, job.fit);
+  weigh_under_all_errors(problem, job);
   job.finished = true;
 }
 
 /// What the data say of place and shape beyond the prior costs, as in Laplace's evidence.
-double occam(const Job& job, const Metric& metric) {
+double occam(const Job& job) {
   const auto& priors = job.parameters->priors();
   const auto shape = [&job, &priors](Eigen::Index i) {
     const auto k = static_cast<std::size_t>(i);
     return priors[k] && job.parameters->names()[k].rfind(job.effect + ".", 0) == 0;
   };
   const Eigen::MatrixXd covariance =
-      information(job.fit, *job.parameters, metric).completeOrthogonalDecomposition().pseudoInverse();
+      information(job.fit, *job.parameters, job.metric).completeOrthogonalDecomposition().pseudoInverse();
   double sum = 0;
   for (Eigen::Index i = 0; i < job.parameters->size(); ++i)
     if (shape(i)) sum += std::log(std::pow(priors[static_cast<std::size_t>(i)]->sd, 2) / covariance(i, i));
@@ -138,8 +152,8 @@ Refit summary(const RefitProblem& problem, Job& job) {
   refit.effect = job.effect, refit.solved = job.solved, refit.finished = job.finished, refit.freedom = job.freedom;
   if (!job.solved) return refit;
   const calibration::Fit& fit = job.fit.fit;
-  refit.gain = problem.base->objective - job.fit.objective;
-  refit.bic = refit.gain - refit.freedom * problem.log_points - occam(job, *problem.metric);
+  refit.gain = problem.base->objective - job.objective;
+  refit.bic = refit.gain - refit.freedom * problem.log_points - occam(job);
   refit.rms_mm = rms(fit.residuals.distance_mm);
   refit.held_out_rms_mm =
       rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, prior_information(*job.parameters),
@@ -233,10 +247,10 @@ std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vect
   side_by_side(problem, order, "refit with", [&problem](Job& job) { begin(problem, job); });
   double best = 0;
   for (const Job& job : jobs)
-    if (job.solved) best = std::max(best, problem.base->objective - job.fit.objective);
+    if (job.solved) best = std::max(best, problem.base->objective - job.objective);
   order.clear();
   for (Job& job : jobs)
-    if (job.solved && problem.base->objective - job.fit.objective >= hopeless_share * best) order.push_back(&job);
+    if (job.solved && problem.base->objective - job.objective >= hopeless_share * best) order.push_back(&job);
   side_by_side(problem, order, "to the end with", [&problem](Job& job) { finish(problem, job); });
   std::vector<Refit> refits(jobs.size());
 #pragma omp parallel for schedule(dynamic, 1)

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/error_sources.h"
 #include "diagnosis/score_test.h"
 #include "diagnosis/weighted_fit.h"
 
@@ -42,12 +43,14 @@ struct RefitProblem {
   const simulation::Model* model;  ///< the base model at its optimum
   const WeightedFit* base;
   const Metric* metric;
+  const ErrorSources* sources;                       ///< of the metric
   double log_points;                                 ///< ln n of the BIC
   std::function<void(const std::string&)> progress;  ///< may be empty; called by any thread, one at a time
 };
 
-/// Refits candidates side by side: each from the catalogue's usual size and from its one-step size, whichever starts
-/// better; three steps for all, to the end for those whose F comes within reach of the best.
+/// Refits candidates side by side, each without the tolerance for itself, and compares them under all errors: from the
+/// catalogue's usual size and from its one-step size, whichever starts better; three steps for all, to the end for
+/// those whose F comes within reach of the best.
 std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vector<Candidate>& candidates,
                                     const ScoreTable& table, const std::vector<std::string>& which);
 

@@ -10,7 +10,6 @@ struct QuadPairs {
   Eigen::VectorXi quad;  ///< by triangle: its quad, numbered from 0 without gaps; −1 for a triangle alone
   int quads = 0, alone = 0;
   int faces() const { return quads + alone; }
-  double quad_share() const { return faces() > 0 ? static_cast<double>(quads) / faces() : 0; }
 };
 
 /// Joins neighbouring triangles of one region to quads whose angles lie in [90 − @p largest_deviation_deg, 90 + the

@@ -41,6 +41,7 @@ struct Case {
 
   std::filesystem::path image_file;  ///< absolute or relative to the working directory, exists
   std::string image_kind;            ///< labels or mri
+  std::string image_frame;           ///< of a volume that names none (patient_frame.h); empty = `frame`
   std::string image_series;          ///< of a DICOM folder: number, description or uid; empty = the only one
   AllowedCuts cut;
   std::map<int, segmentation::Tissue> labels;  ///< value in the file → tissue (kind = labels)

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "pipeline/patient_frame.h"
 #include "segmentation/recipe_toml.h"
 
 namespace supine::pipeline {
@@ -68,7 +69,7 @@ fs::path case_path(const TomlReader& reader, std::string_view key, bool folder_a
 void read_case_image(const TomlReader& file, Case& result) {
   const auto image = file.sub_table("image");
   if (!image) file.fail("image", "table [image] is missing: it names the volume");
-  image->allow({"file", "kind", "series", "cut", "rim_mm", "labels"});
+  image->allow({"file", "kind", "frame", "series", "cut", "rim_mm", "labels"});
   image->required_text("kind");
   result.image_kind = image->choice("kind", {"labels", "mri"}, "labels");
   result.image_file = case_path(*image, "file", true);
@@ -76,6 +77,14 @@ void read_case_image(const TomlReader& file, Case& result) {
     if (!fs::is_directory(result.image_file))
       image->fail("series", "has no effect: image.file is a file, only a DICOM folder holds series");
     result.image_series = *series;
+  }
+  if (const auto frame = image->text("frame")) {
+    if (!axes_of_frame(*frame))
+      image->fail("frame",
+                  fmt::format("\"{}\" is no frame; give three letters, the sides of the patient to which x, y and "
+                              "z grow: one of L R, one of A P, one of S I, for example \"ALS\"",
+                              *frame));
+    result.image_frame = *frame;
   }
   read_cut(*image, result.cut);
 

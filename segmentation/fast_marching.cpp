@@ -2,125 +2,108 @@
 #include "segmentation/fast_marching.h"
 
 #include <fmt/format.h>
-#include <sys/mman.h>
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <new>
 #include <vector>
 
 #include "common/error.h"
+#include "segmentation/front_grid.h"
+#include "segmentation/front_queue.h"
+#include "segmentation/upwind.h"
 
 namespace supine::segmentation {
 namespace {
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
-constexpr std::size_t bucket_count = 4096;
-constexpr int rim = 2;  // voxels around the volume that no front enters, so that stencils need no bounds
+constexpr float not_solved = -1, given_back = -2;
 
-/// Time and state of a voxel side by side: the front comes back to its voxels in an order that no cache foresees.
-struct Voxel {
-  float time = infinite;
-  float slowness = infinite;  ///< negative once the front has passed; infinite where it may not go or the time is given
-  bool passed() const { return std::signbit(slowness); }
-  void pass() { slowness = -slowness; }
+/// A voxel beside the front, one cache line: all that its arrival time depends on, so that no stencil is gathered.
+struct alignas(64) BandVoxel {
+  UpwindSides sides;
+  float slowness = 0;
+  float time = not_solved;  ///< the last solution, which the entry in the queue must agree with
+  std::uint32_t voxel = 0;
 };
 
-/// Memory in large pages where the system has them: half of the time went into finding small ones.
-template <class T>
-struct LargePages {
-  using value_type = T;
-  LargePages() = default;
-  template <class U>
-  LargePages(const LargePages<U>&) {}
-  T* allocate(std::size_t count) {
-    constexpr std::size_t page = std::size_t{1} << 21;
-    const std::size_t bytes = (count * sizeof(T) + page - 1) / page * page;
-    void* memory = std::aligned_alloc(page, bytes);
-    if (memory == nullptr) throw std::bad_alloc();
-    madvise(memory, bytes, MADV_HUGEPAGE);
-    return static_cast<T*>(memory);
-  }
-  void deallocate(T* memory, std::size_t) { std::free(memory); }
-  bool operator==(const LargePages&) const { return true; }
-};
-
-/// Voxels in the order of their times: buckets of equal width, of which the earliest is a heap. Times beyond the last
-/// bucket wait aside until the others are used up.
-class BucketQueue {
+/// Records of the voxels beside the front; a number given back is used again.
+class Band {
  public:
-  struct Entry {
-    float time;
-    std::uint32_t voxel;
-    /// For a heap with the earliest on top; ties by voxel, so that the order does not depend on the heap's.
-    bool operator<(const Entry& other) const {
-      return time > other.time || (time == other.time && voxel > other.voxel);
+  BandVoxel& operator[](std::uint32_t record) { return records_[record]; }
+  const BandVoxel& operator[](std::uint32_t record) const { return records_[record]; }
+  std::uint32_t take(std::uint32_t voxel, float slowness) {
+    std::uint32_t record = static_cast<std::uint32_t>(records_.size());
+    if (free_.empty()) {
+      records_.emplace_back();
+    } else {
+      record = free_.back();
+      free_.pop_back();
+      records_[record] = {};
     }
-  };
-  explicit BucketQueue(double width) : width_(width), buckets_(bucket_count) {}
-
-  void push(std::uint32_t voxel, float time) {
-    const std::int64_t bucket = std::max(current_, static_cast<std::int64_t>(time / width_));
-    if (bucket >= current_ + static_cast<std::int64_t>(bucket_count)) {
-      later_.push_back({time, voxel});
-      return;
-    }
-    auto& entries = buckets_[static_cast<std::size_t>(bucket) % bucket_count];
-    entries.push_back({time, voxel});
-    if (bucket == current_) std::push_heap(entries.begin(), entries.end());
-    ++held_;
+    records_[record].slowness = slowness;
+    records_[record].voxel = voxel;
+    return record;
   }
-  /// The earliest entry, or false.
-  bool pop(Entry& entry) {
-    if (held_ == 0) {
-      if (later_.empty()) return false;
-      fetch_later();
-    }
-    while (buckets_[static_cast<std::size_t>(current_) % bucket_count].empty()) {
-      ++current_;
-      auto& next = buckets_[static_cast<std::size_t>(current_) % bucket_count];
-      std::make_heap(next.begin(), next.end());
-    }
-    auto& entries = buckets_[static_cast<std::size_t>(current_) % bucket_count];
-    std::pop_heap(entries.begin(), entries.end());
-    entry = entries.back();
-    entries.pop_back();
-    --held_;
-    return true;
+  void give_back(std::uint32_t record) {
+    records_[record].time = given_back;
+    free_.push_back(record);
+  }
+  void prefetch(std::uint32_t record) const { __builtin_prefetch(&records_[record]); }
+  bool is_current(FrontQueue::Entry entry) const {
+    return std::bit_cast<std::uint32_t>(records_[entry.item()].time) == entry.time_bits();
   }
 
  private:
-  void fetch_later() {
-    float first = infinite;
-    for (const Entry& waiting : later_) first = std::min(first, waiting.time);
-    current_ = static_cast<std::int64_t>(first / width_);
-    std::vector<Entry> waiting;
-    waiting.swap(later_);
-    for (const Entry& entry : waiting) push(entry.voxel, entry.time);
+  std::vector<BandVoxel, LargePages<BandVoxel>> records_;
+  std::vector<std::uint32_t> free_;
+};
+
+/// Records that wait for their first solution, in the order of the times at which they may pass at the earliest.
+class WaitingRoom {
+ public:
+  struct Guest {
+    float earliest;
+    std::uint32_t record;
+  };
+  void push(float earliest, std::uint32_t record) { guests_.push_back({earliest, record}); }
+  bool empty() const { return head_ == guests_.size(); }
+  const Guest& first() const { return guests_[head_]; }
+  const Guest& later(std::size_t places) const { return guests_[std::min(head_ + places, guests_.size() - 1)]; }
+  void pop() {
+    if (++head_ < 65536 || 2 * head_ < guests_.size()) return;
+    guests_.erase(guests_.begin(), guests_.begin() + static_cast<std::ptrdiff_t>(head_));
+    head_ = 0;
   }
-  double width_;
-  std::int64_t current_ = 0;
-  std::size_t held_ = 0;
-  std::vector<std::vector<Entry>> buckets_;
-  std::vector<Entry> later_;
+
+ private:
+  std::vector<Guest> guests_;
+  std::size_t head_ = 0;
 };
 
 class FrontRun {
  public:
   FrontRun(const Image<float>& speed, const FastMarchingOptions& options)
-      : speed_(speed), grid_(speed.grid), options_(options), queue_(bucket_width(speed)) {
-    const Eigen::Vector3i padded = grid_.size.array() + 2 * rim;
-    strides_ = {1, padded.x(), static_cast<std::ptrdiff_t>(padded.x()) * padded.y()};
-    const std::size_t count = static_cast<std::size_t>(strides_[2]) * padded.z();
-    voxels_.resize(count);
+      : speed_(speed), grid_(speed.grid), options_(options), front_(grid_.size) {
+    const float fastest = *std::max_element(speed.voxels.begin(), speed.voxels.end());
+    least_slowness_ = 1 / fastest;
 #pragma omp parallel for schedule(static)
     for (int k = 0; k < grid_.size.z(); ++k)
       for (int j = 0; j < grid_.size.y(); ++j)
-        for (int i = 0; i < grid_.size.x(); ++i) voxels_[padded_index(i, j, k)].slowness = 1 / speed.at(i, j, k);
-    for (int a = 0; a < 3; ++a) inverse_[a] = static_cast<float>(1 / grid_.spacing_mm[a]);
+        for (int i = 0; i < grid_.size.x(); ++i) {
+          const float slowness = fastest / speed.at(i, j, k);
+          if (std::isfinite(slowness * least_slowness_)) front_[front_.index(i, j, k)] = FrontState::fresh(slowness);
+        }
+    double squares = 0;
+    for (int a = 0; a < 3; ++a) {
+      inverse_squared_[a] = static_cast<float>(1 / std::pow(grid_.spacing_mm[a], 2));
+      if (grid_.size[a] > 1) squares += inverse_squared_[a];
+    }
+    // All sides at the time of the earliest and in full use; second order moves a side up to 1.5 times as steeply.
+    earliest_after_ =
+        static_cast<float>(0.9999 * least_slowness_ / std::sqrt(squares) / (options.order == 2 ? 1.5 : 1));
   }
 
   void start(const FrontSource& source) {
@@ -140,96 +123,126 @@ class FrontRun {
           const double way = (voxel - at).cwiseProduct(grid_.spacing_mm).norm();
           const bool around = ((voxel - at).array().abs() < 1).all();
           if ((way <= options_.source_radius_mm || around) && speed_.at(i, j, k) > 0)
-            give(static_cast<std::uint32_t>(padded_index(i, j, k)), static_cast<float>(source.time + way * slow));
+            give(front_.index(i, j, k), static_cast<float>(source.time + way * slow));
         }
   }
 
   Image<float> run() {
-    BucketQueue::Entry entry;
-    while (queue_.pop(entry)) {
-      const std::uint32_t n = entry.voxel;
-      Voxel& voxel = voxels_[n];
-      if (voxel.passed() || entry.time != voxel.time) continue;  // an entry it left behind
-      if (entry.time > options_.stop_time) break;
-      voxel.pass();
-      for (const std::ptrdiff_t stride : strides_) {
-        visit(static_cast<std::uint32_t>(n - stride));
-        visit(static_cast<std::uint32_t>(n + stride));
-      }
+    for (const std::uint32_t voxel : given_) {
+      const std::uint32_t record = band_.take(voxel, 0);
+      band_[record].time = front_[voxel].time();
+      queue_.push(front_[voxel].time(), record);
     }
-    return unpad();
+    while (next_bucket()) {
+      const FrontQueue::Entry entry = queue_.earliest();
+      if (!waiting_.empty() && waiting_.first().earliest <= entry.time()) {
+        settle_first_waiting();
+        continue;
+      }
+      if (entry.time() > options_.stop_time) break;
+      queue_.pop();
+      look_ahead();
+      if (band_.is_current(entry)) pass(entry);
+    }
+    return times();
   }
 
  private:
-  /// A bucket is crossed in a sixteenth of a voxel at full speed, so that its heap stays small.
-  static double bucket_width(const Image<float>& speed) {
-    float fastest = 0;
-    for (const float v : speed.voxels) fastest = std::max(fastest, v);
-    return speed.grid.spacing_mm.minCoeff() / (16.0 * fastest);
+  void give(std::uint32_t voxel, float time) {
+    if (front_[voxel].is_passed() && time >= front_[voxel].time()) return;
+    if (!front_[voxel].is_passed()) given_.push_back(voxel);
+    front_[voxel] = FrontState::passed(time);
   }
-  std::size_t padded_index(int i, int j, int k) const {
-    return static_cast<std::size_t>((i + rim) + (j + rim) * strides_[1] + (k + rim) * strides_[2]);
+
+  /// Whether anything is left; then the queue's open bucket holds something, and nobody waits who might come before.
+  bool next_bucket() {
+    while (queue_.used_up()) {
+      const std::uint32_t bucket = queue_.next_bucket();
+      if (!waiting_.empty() && FrontQueue::bucket(waiting_.first().earliest) <= bucket) {
+        settle_first_waiting();
+      } else if (bucket == FrontQueue::none) {
+        return false;
+      } else {
+        queue_.open_next([this](FrontQueue::Entry entry) { return band_.is_current(entry); },
+                         [this](FrontQueue::Entry entry) { band_.prefetch(entry.item()); });
+      }
+    }
+    return true;
   }
-  void give(std::uint32_t n, float time) {
-    if (time >= voxels_[n].time) return;
-    voxels_[n] = {time, infinite};
-    queue_.push(n, time);
+
+  void settle_first_waiting() {
+    const std::uint32_t record = waiting_.first().record;
+    band_.prefetch(waiting_.later(8).record);
+    waiting_.pop();
+    settle(record);
   }
-  void visit(std::uint32_t n) {
-    Voxel& voxel = voxels_[n];
-    if (voxel.passed() || std::isinf(voxel.slowness)) return;
-    // The last solution counts, not the smallest: it knows most neighbours, and second differences may raise it.
-    const float time = solve(n);
+
+  /// Solves for the record's time. The last solution counts, not the smallest: it knows most neighbours, and second
+  /// differences may raise it.
+  void settle(std::uint32_t record) {
+    BandVoxel& voxel = band_[record];
+    const float time = arrival_time(voxel.sides, voxel.slowness);
     if (time == voxel.time) return;
     voxel.time = time;
-    queue_.push(n, time);
+    if (time < infinite) queue_.push(time, record);
   }
 
-  /// One axis of the upwind differences: (a T - b)^2 with T > from.
-  struct Side {
-    float a, b, from;
-  };
-  float passed_time(std::size_t n) const { return voxels_[n].passed() ? voxels_[n].time : infinite; }
-  float solve(std::uint32_t n) const {
-    std::array<Side, 3> sides;
-    int count = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::ptrdiff_t stride = strides_[axis];
-      const float below = passed_time(n - stride), above = passed_time(n + stride);
-      const float nearest = std::min(below, above);
-      if (std::isinf(nearest)) continue;
-      const std::ptrdiff_t step = below < above ? -stride : stride;
-      Side side{inverse_[axis], nearest * inverse_[axis], nearest};
-      if (const float second = options_.order == 2 ? passed_time(n + 2 * step) : infinite; second <= nearest)
-        side = {1.5f * inverse_[axis], (2 * nearest - 0.5f * second) * inverse_[axis], nearest};
-      int at = count++;
-      for (; at > 0 && sides[at - 1].from > side.from; --at) sides[at] = sides[at - 1];
-      sides[at] = side;
+  void pass(FrontQueue::Entry entry) {
+    const float time = entry.time();
+    const std::uint32_t voxel = band_[entry.item()].voxel;
+    front_[voxel] = FrontState::passed(time);
+    band_.give_back(entry.item());
+    const FrontGrid::Neighbours neighbours = front_.neighbours(voxel);
+    std::array<FrontState, 6> states;
+    for (int side = 0; side < 6; ++side) states[side] = front_[neighbours[side]];
+    unsigned open = 0;
+    for (int side = 0; side < 6; ++side) open |= static_cast<unsigned>(!states[side].is_passed()) << side;
+    for (; open != 0; open &= open - 1) {
+      const int side = std::countr_zero(open);
+      tell(neighbours[side], states[side], side / 2, time, states[side ^ 1]);
     }
-    for (; count > 0; --count) {  // leave out the latest side until the front comes from behind all that are left
-      const float time = root(sides, count, voxels_[n].slowness);
-      if (time >= sides[count - 1].from) return time;
-    }
-    return infinite;
-  }
-  static float root(const std::array<Side, 3>& sides, int count, float slowness) {
-    double aa = 0, ab = 0, bb = -static_cast<double>(slowness) * slowness;
-    for (int s = 0; s < count; ++s) {
-      aa += static_cast<double>(sides[s].a) * sides[s].a;
-      ab += static_cast<double>(sides[s].a) * sides[s].b;
-      bb += static_cast<double>(sides[s].b) * sides[s].b;
-    }
-    const double discriminant = ab * ab - aa * bb;
-    return discriminant < 0 ? -1.0f : static_cast<float>((ab + std::sqrt(discriminant)) / aa);
   }
 
-  Image<float> unpad() const {
+  /// A voxel learns that the front passed its neighbour along an axis. @param beyond  state of the neighbour's
+  /// neighbour
+  void tell(std::uint32_t voxel, FrontState state, int axis, float time, FrontState beyond) {
+    std::uint32_t record;
+    if (state.is_fresh()) {
+      record = band_.take(voxel, state.slowness() * least_slowness_);
+      front_[voxel] = FrontState::in_band(record);
+      waiting_.push(time + earliest_after_, record);
+    } else {
+      record = state.record();
+      if (band_[record].sides.known(axis)) return;  // the front came from the other side before
+    }
+    BandVoxel& told = band_[record];
+    if (options_.order == 2 && beyond.passed_by(time)) {
+      told.sides.set_second_order(axis, time, beyond.time(), inverse_squared_[axis]);
+    } else {
+      told.sides.set_first_order(axis, time, inverse_squared_[axis]);
+    }
+    if (told.time != not_solved) settle(record);
+  }
+
+  /// Fetches what the next entries will read, in steps: their records, their neighbours, their neighbours' records.
+  void look_ahead() const {
+    const auto next = queue_.ahead();
+    if (next.size() > 24) band_.prefetch(next[24].item());
+    if (next.size() > 12 && band_.is_current(next[12]))
+      for (const std::uint32_t n : front_.neighbours(band_[next[12].item()].voxel)) __builtin_prefetch(&front_[n]);
+    if (next.size() > 5 && band_.is_current(next[5]))
+      for (const std::uint32_t n : front_.neighbours(band_[next[5].item()].voxel))
+        if (front_[n].is_in_band()) band_.prefetch(front_[n].record());
+  }
+
+  Image<float> times() const {
     Image<float> result{grid_, std::vector<float>(grid_.count())};
 #pragma omp parallel for schedule(static)
     for (int k = 0; k < grid_.size.z(); ++k)
       for (int j = 0; j < grid_.size.y(); ++j)
         for (int i = 0; i < grid_.size.x(); ++i) {
-          result.at(i, j, k) = passed_time(padded_index(i, j, k));
+          const FrontState state = front_[front_.index(i, j, k)];
+          result.at(i, j, k) = state.is_passed() && state.time() <= options_.stop_time ? state.time() : infinite;
         }
     return result;
   }
@@ -237,10 +250,14 @@ class FrontRun {
   const Image<float>& speed_;
   const Grid& grid_;
   FastMarchingOptions options_;
-  BucketQueue queue_;
-  std::array<std::ptrdiff_t, 3> strides_;
-  std::array<float, 3> inverse_;
-  std::vector<Voxel, LargePages<Voxel>> voxels_;
+  std::array<float, 3> inverse_squared_;
+  float least_slowness_ = 0;
+  float earliest_after_ = 0;  ///< the least time from the first neighbour to a voxel
+  FrontGrid front_;
+  FrontQueue queue_;
+  Band band_;
+  WaitingRoom waiting_;
+  std::vector<std::uint32_t> given_;  ///< voxels with a source's time
 };
 
 void check(const Image<float>& speed, std::span<const FrontSource> sources, const FastMarchingOptions& options) {
@@ -250,6 +267,10 @@ void check(const Image<float>& speed, std::span<const FrontSource> sources, cons
     throw InputError(fmt::format("fast marching: stop_time {} must be > 0", options.stop_time));
   if (!(options.source_radius_mm >= 0))
     throw InputError(fmt::format("fast marching: source_radius_mm {} must be >= 0", options.source_radius_mm));
+  if (const double stored = FrontGrid::stored(speed.grid.size); stored > FrontQueue::none)
+    throw InputError(
+        fmt::format("fast marching: {:.0f} voxels with the border; at most {}: use a coarser or smaller volume", stored,
+                    FrontQueue::none));
   if (sources.empty()) throw InputError("fast marching: there is no source; give at least one point in mm");
   const auto bad =
       std::find_if(speed.voxels.begin(), speed.voxels.end(), [](float v) { return !(v >= 0) || std::isinf(v); });

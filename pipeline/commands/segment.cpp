@@ -9,6 +9,7 @@
 
 #include "common/error.h"
 #include "pipeline/case.h"
+#include "pipeline/patient_frame.h"
 #include "pipeline/tool.h"
 #include "segmentation/data_file.h"
 #include "segmentation/dicom_io.h"
@@ -124,8 +125,7 @@ class SegmentTool : public Tool {
     run.progress("reading " + file);
     segmentation::ImageFile volume = read_volume(measured.image_file, measured, run);
     findings.file_frame = volume.frame;
-    if (volume.frame.empty())
-      run.warn(fmt::format("the volume names no patient frame; taken as {} (case.frame)", measured.frame));
+    check_frame(measured, volume.frame, run);
     if (measured.image_kind == "labels") {
       run.stage("map");
       segmentation::MappedLabels mapped = segmentation::map_labels(volume.image, measured.labels, file);
@@ -148,9 +148,31 @@ class SegmentTool : public Tool {
     return std::move(result.labels);
   }
 
+  static void check_frame(const Case& measured, const std::string& named, Run& run) {
+    if (!measured.image_frame.empty() && !named.empty())
+      throw InputError(
+          fmt::format("{}: the file names its own frame, {}; take image.frame = \"{}\" out of case.toml, or "
+                      "correct the file",
+                      measured.image_file.string(), named, measured.image_frame));
+    if (measured.image_frame.empty() && named.empty())
+      run.warn(fmt::format("the volume names no patient frame; taken as {} (case.frame; image.frame names another)",
+                           measured.frame));
+    constexpr double least_to_front = 0.5;  // of a unit vector: 60 degrees
+    const Eigen::Vector3d& falls = measured.pose("prone").gravity;
+    if (-falls.y() < least_to_front)
+      run.warn(
+          fmt::format("[pose.prone] gravity is LPS ({:.2f}, {:.2f}, {:.2f}); a prone patient's breast falls to the "
+                      "front, (0, -1, 0). If the volume's axes are not the patient's, say so by image.frame and "
+                      "give gravity in case.frame",
+                      falls.x(), falls.y(), falls.z()));
+  }
+
   static segmentation::ImageFile read_volume(const fs::path& file, const Case& measured, Run& run) {
     if (fs::is_directory(file)) return read_series(file, measured, run);
-    segmentation::ImageFile volume = segmentation::read_image(run.input(file), measured.frame);
+    const bool turned = !measured.image_frame.empty();
+    segmentation::ImageFile volume = segmentation::read_image(run.input(file), turned ? "LPS" : measured.frame);
+    if (turned && volume.frame.empty())
+      volume.image.grid = in_lps(volume.image.grid, *axes_of_frame(measured.image_frame));
     if (const auto voxels = segmentation::detached_data_file(file)) run.input(*voxels);
     for (const auto& warning : volume.warnings) run.warn(warning);
     return volume;

@@ -11,8 +11,13 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
 
-template <class T>
-std::string encoded(const std::vector<T>& numbers) {
+/// Base64 of the values, row by row, each as a @p Number.
+template <class Number, class Values>
+std::string encoded(const Values& values) {
+  std::vector<Number> numbers;
+  numbers.reserve(static_cast<std::size_t>(values.size()));
+  for (const auto& row : values.rowwise())
+    for (const auto value : row) numbers.push_back(static_cast<Number>(value));
   return base64(std::as_bytes(std::span(numbers)));
 }
 
@@ -38,35 +43,13 @@ std::string base64(std::span<const std::byte> bytes) {
   return text;
 }
 
-std::string base64_floats(const Points& values) {
-  std::vector<float> numbers;
-  numbers.reserve(static_cast<std::size_t>(values.size()));
-  for (const auto& row : values.rowwise())
-    for (const double value : row) numbers.push_back(static_cast<float>(value));
-  return encoded(numbers);
-}
+std::string base64_floats(const Points& values) { return encoded<float>(values); }
 
-std::string base64_values(const Eigen::VectorXd& values) {
-  std::vector<float> numbers;
-  numbers.reserve(static_cast<std::size_t>(values.size()));
-  for (const double value : values) numbers.push_back(static_cast<float>(value));
-  return encoded(numbers);
-}
+std::string base64_values(const Eigen::VectorXd& values) { return encoded<float>(values); }
 
-std::string base64_indices(const Triangles& values) {
-  std::vector<std::uint32_t> numbers;
-  numbers.reserve(static_cast<std::size_t>(values.size()));
-  for (const auto& row : values.rowwise())
-    for (const int value : row) numbers.push_back(static_cast<std::uint32_t>(value));
-  return encoded(numbers);
-}
+std::string base64_indices(const Triangles& values) { return encoded<std::uint32_t>(values); }
 
-std::string base64_bytes(const Eigen::VectorXi& values) {
-  std::vector<std::uint8_t> numbers;
-  numbers.reserve(static_cast<std::size_t>(values.size()));
-  for (const int value : values) numbers.push_back(static_cast<std::uint8_t>(value));
-  return encoded(numbers);
-}
+std::string base64_bytes(const Eigen::VectorXi& values) { return encoded<std::uint8_t>(values); }
 
 std::string json_for_script(const nlohmann::ordered_json& json) {
   std::string text = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);

@@ -46,15 +46,18 @@ void write_topology(std::ostream& out, const Indices& cells, const char* name) {
   fmt::print(out, "\"/>\n");
 }
 
+void write_neo_hookean(std::ostream& out, const Lame& material) {
+  fmt::print(out,
+             "      <TetrahedronHyperelasticityFEMForceField topology=\"@cells\" materialName=\"NeoHookean\" "
+             "ParameterSet=\"{:.14g} {:.14g}\"/>\n",
+             material.mu_kpa, material.lambda_kpa);
+}
+
 void write_bulk(std::ostream& out, const ExportedPose& pose) {
   fmt::print(out, "    <Node name=\"tissue\">\n      ");
   write_topology(out, pose.cells, "cells");
   if (pose.law == BulkLaw::neo_hookean) {
-    const auto [mu, lambda] = lame(pose.materials[0].young_kpa, pose.materials[0].poisson);
-    fmt::print(out,
-               "      <TetrahedronHyperelasticityFEMForceField topology=\"@cells\" materialName=\"NeoHookean\" "
-               "ParameterSet=\"{:.14g} {:.14g}\"/>\n",
-               mu, lambda);
+    write_neo_hookean(out, lame(pose.materials[0].young_kpa, pose.materials[0].poisson));
   } else {
     fmt::print(out,
                "      <TetrahedronFEMForceField topology=\"@cells\" method=\"{}\" poissonRatio=\"{:.14g}\" "
@@ -73,11 +76,7 @@ void write_skin(std::ostream& out, const ExportedPose& pose) {
   write_topology(out, pose.skin, "cells");
   const auto [young, nu] = pose.skin_material;
   if (pose.skin_law == SkinLaw::neo_hookean) {
-    const auto [mu, lambda] = lame(young * 2 * (1 + skin_poisson) / 3, skin_poisson);
-    fmt::print(out,
-               "      <TetrahedronHyperelasticityFEMForceField topology=\"@cells\" materialName=\"NeoHookean\" "
-               "ParameterSet=\"{:.14g} {:.14g}\"/>\n",
-               mu, lambda);
+    write_neo_hookean(out, lame(young * 2 * (1 + skin_poisson) / 3, skin_poisson));
   } else {
     fmt::print(out,
                "      <TetrahedronFEMForceField topology=\"@cells\" method=\"svd\" poissonRatio=\"{:.14g}\" "

@@ -206,5 +206,22 @@ TEST(LeastSquares, SaysWhenNoStartHasAnEquilibrium) {
   EXPECT_THROW(fit_least_squares(evaluator, parameters, options), NumericalFailure);
 }
 
+TEST(LeastSquares, SaysThatNoPointOfTheScanLiesOverTheSkin) {
+  const Twin beside({.truth = twin_truth(), .frame = Eigen::Isometry3d(Eigen::Translation3d(500, 0, 0))});
+  calibration::Scene scene = exact_twin().scene();
+  scene.measurements = beside.scene().measurements;
+  const FreeParameters parameters(twin_start());
+  Evaluator evaluator(scene, twin_start());
+  FitOptions options;
+  options.noise_mm = {0.7};
+  try {
+    fit_least_squares(evaluator, parameters, options);
+    FAIL() << "fitted";
+  } catch (const NumericalFailure& error) {
+    EXPECT_NE(std::string(error.what()).find("no point of a scan lies over the skin"), std::string::npos)
+        << error.what();
+  }
+}
+
 }  // namespace
 }  // namespace supine::calibration

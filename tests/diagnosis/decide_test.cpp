@@ -73,14 +73,25 @@ TEST(Decide, ALowPNamesWhatLiesUnderOneBlockOfSkinAlone) {
   EXPECT_EQ(verdict({open}).verdict, Verdict::unexplained) << "interval";
 }
 
-TEST(Decide, AnUnfittedPoseCanDenyIt) {
+TEST(Decide, AnUnfittedPoseHasToConfirmIt) {
   BaseFigures base = base_figures(real_left);
   base.pose_rms_mm = {1.0};
   const auto with_pose = [&base](double pose) {
     return decide(table_with(0.001), {sure_refit(60, 1.8, {pose})}, {nothing_left}, base).verdict;
   };
-  EXPECT_EQ(with_pose(1.01), Verdict::missing);
+  EXPECT_EQ(with_pose(0.96), Verdict::missing);
+  EXPECT_EQ(with_pose(0.99), Verdict::unexplained) << "of 1.0 mm 0.51 mm² are above the noise";
   EXPECT_EQ(with_pose(1.1), Verdict::unexplained);
+}
+
+TEST(Decide, AScanThatLiesElsewhereIsNotJudgedByAnotherScan) {
+  BaseFigures base = base_figures(real_left);
+  base.pose_rms_mm = {1.0};
+  Refit shifted = refit("misregistration", 60, 1.8, {1.3});
+  shifted.parameters = {{"misregistration.shift_x_mm", "mm", 3, 2, 4}};
+  ScoreTable table = table_with(0.001);
+  table.scores[0].effect = "misregistration";
+  EXPECT_EQ(decide(table, {shifted}, {nothing_left}, base).verdict, Verdict::missing);
 }
 
 TEST(Decide, WhatComesNearIsARivalWhetherItCountsOrNot) {

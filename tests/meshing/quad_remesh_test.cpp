@@ -54,7 +54,7 @@ TEST(QuadRemesh, KeepsGenusOneAndHitsTheNumberOfFaces) {
     EXPECT_EQ(check_surface(out.surface).genus(), 1);
     EXPECT_TRUE(reconstruction::self_intersections(out.surface).empty());
     EXPECT_NEAR(static_cast<double>(out.pairs.faces()) / faces, 1, 0.1);
-    EXPECT_GT(out.pairs.quad_share(), 0.9);
+    EXPECT_GT(out.pairs.quads, 0.9 * out.pairs.faces());
     // One and a half times the height of a chord over the tube, for edges of sqrt(area / faces).
     const double edge_squared = check_surface(in).area_mm2 / faces;
     EXPECT_LT(largest_distance(in, out.surface), 1.5 * edge_squared / (8 * 12));
@@ -80,7 +80,7 @@ TEST(QuadRemesh, OpenBordersStayOnTheirPlace) {
   });
   const QuadMesh out = remeshed(in, {.edge_mm = 4});
   expect_topology(in, out.surface);
-  EXPECT_GT(out.pairs.quad_share(), 0.9);
+  EXPECT_GT(out.pairs.quads, 0.9 * out.pairs.faces());
   EXPECT_LT(largest_distance(in, out.surface), 0.4);
   for (const auto& edge : reconstruction::mesh_edges(out.surface.triangles)) {
     if (edge.count != 1) continue;

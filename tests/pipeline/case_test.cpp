@@ -137,6 +137,10 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         BadCase{"NotToml", "[case]", "[case", {":1:", "not valid TOML"}},
         BadCase{"UnknownKey", "side =", "sied =", {":4", "[case] sied", "unknown key", "did you mean side?"}},
+        BadCase{"UnknownFrame",
+                "kind = \"labels\"",
+                "kind = \"labels\"\nframe = \"ALP\"",
+                {":9", "[image] frame", "ALP", "three letters"}},
         BadCase{"UnknownTable", "[landmarks]", "[landmark]", {"landmark:", "did you mean landmarks?"}},
         BadCase{"KeyTwice", "name = \"phantom\"", "name = \"a\"\nname = \"b\"", {":3"}},
         BadCase{"NoName", "name = \"phantom\"", "", {"[case] name", "missing"}},

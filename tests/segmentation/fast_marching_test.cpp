@@ -2,10 +2,13 @@
 #include "segmentation/fast_marching.h"
 
 #include <gtest/gtest.h>
+#include <omp.h>
 
 #include <cmath>
+#include <random>
 
 #include "tests/segmentation/image_files.h"
+#include "tests/segmentation/plain_march.h"
 
 namespace supine::segmentation {
 namespace {
@@ -126,6 +129,84 @@ TEST(FastMarching, FillsADeadEndLateAndManyBucketsApart) {
   EXPECT_NEAR(time.voxels[29] / 1e7, 1, 1e-4);
 }
 
+/// An uneven box, speeds 0.5 to 2.5, with walls; its source lies at a voxel's centre.
+Image<float> uneven_box() {
+  Image<float> speed = box(1, {1, 0.8, 1.5});
+  const Eigen::Vector3i& size = speed.grid.size;
+  for (int k = 0; k < size.z(); ++k)
+    for (int j = 0; j < size.y(); ++j)
+      for (int i = 0; i < size.x(); ++i) {
+        const double wave = std::sin(0.13 * i) * std::cos(0.1 * j) * std::sin(0.3 * k);
+        speed.at(i, j, k) = i == 28 && j > 5 ? 0 : static_cast<float>(1.5 + wave);
+      }
+  return speed;
+}
+
+/// Root mean square and largest difference over the voxels reached; the others must be the same.
+std::pair<double, double> difference(const Image<float>& a, const Image<double>& b) {
+  double squares = 0, largest = 0;
+  std::size_t count = 0;
+  for (std::size_t n = 0; n < a.voxels.size(); ++n) {
+    EXPECT_EQ(std::isinf(a.voxels[n]), std::isinf(b.voxels[n])) << n;
+    if (std::isinf(b.voxels[n])) continue;
+    const double off = std::abs(a.voxels[n] - b.voxels[n]);
+    squares += off * off;
+    largest = std::max(largest, off);
+    ++count;
+  }
+  return {std::sqrt(squares / static_cast<double>(count)), largest};
+}
+
+TEST(FastMarching, GivesTheTimesOfAPlainHeapInDoubles) {
+  // To rounding: the order of the queue is exact, and waiting with the first solution changes nothing. Second
+  // differences are taken or not by comparing times, so rounding may move single voxels by some hundredths.
+  const Image<float> even = box(1, {1, 0.8, 1.5}), uneven = uneven_box();
+  const Eigen::Vector3d at = even.grid.point({15, 20, 9});
+  for (const auto& [image, order, rms, largest] :
+       {std::tuple(&even, 1, 1e-5, 1e-4), {&even, 2, 1e-5, 1e-4}, {&uneven, 1, 1e-5, 1e-4}, {&uneven, 2, 1e-3, 0.03}}) {
+    const std::vector<FrontSource> sources = {{at, 0}, {even.grid.point({36, 1, 1}), 7}};
+    const auto [mean, worst] =
+        difference(fast_march(*image, sources, {order, INFINITY, 0}), testing::plain_march(*image, sources, order));
+    EXPECT_LT(mean, rms) << "order " << order;
+    EXPECT_LT(worst, largest) << "order " << order;
+  }
+}
+
+TEST(FastMarching, RandomSpeedsGiveTheTimesOfAPlainHeap) {
+  Image<float> speed = box(1, {1, 1, 1});
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  for (float& v : speed.voxels) v = std::max(0.0f, uniform(random) - 0.2f);
+  speed.at(15, 20, 9) = 1;
+  const std::vector<FrontSource> source = {{speed.grid.point({15, 20, 9}), 0}};
+  const auto [mean, worst] =
+      difference(fast_march(speed, source, {1, INFINITY, 0}), testing::plain_march(speed, source, 1));
+  EXPECT_LT(worst, 2e-4);  // of times to 100 and more
+}
+
+TEST(FastMarching, AFrontThroughASlowLayerComesInItsTurn) {
+  // From row 0 to row 2: 300 through the slow row between, or 700 and back around its end.
+  Image<float> speed;
+  speed.grid.size = {701, 3, 1};
+  speed.voxels.assign(speed.grid.count(), 1);
+  for (int i = 0; i < 700; ++i) speed.at(i, 1, 0) = 1.0f / 300;
+  const std::vector<FrontSource> source = {{{0, 0, 0}, 0}};
+  const auto time = fast_march(speed, source, {1, INFINITY, 0});
+  for (int i = 0; i < 300; ++i) ASSERT_NEAR(time.at(i, 2, 0), 301 + i, 1.5) << i;
+}
+
+TEST(FastMarching, IsTheSameBytesForAnyNumberOfThreads) {
+  const Image<float> speed = uneven_box();
+  const std::vector<FrontSource> source = {{speed.grid.point({15, 20, 9}), 0}};
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const auto one = fast_march(speed, source, {2, INFINITY, 3});
+  omp_set_num_threads(3);
+  const auto three = fast_march(speed, source, {2, INFINITY, 3});
+  omp_set_num_threads(before);
+  EXPECT_EQ(one.voxels, three.voxels);
+}
+
 TEST(FastMarching, SpeedsFallAtEdgesAndAwayFromTheTissue) {
   GreyImage image;
   image.grid.size = {11, 1, 1};
@@ -153,6 +234,9 @@ TEST(FastMarching, RefusesWhatCannotMarch) {
   EXPECT_NE(message(none, {}).find("no source"), std::string::npos);
   EXPECT_NE(message(outside, {}).find("outside the image"), std::string::npos);
   EXPECT_NE(message(early, {}).find("time -1"), std::string::npos);
+  Image<float> large;
+  large.grid.size = {2000, 2000, 2000};
+  EXPECT_NE(message_of([&] { fast_march(large, source, {}); }).find("at most 4294967295"), std::string::npos);
   speed.voxels[3] = -2;
   EXPECT_NE(message(source, {}).find("voxel 3 is -2"), std::string::npos);
   speed.voxels.assign(speed.voxels.size(), 0.0f);

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-
-#include <cstdlib>
-#include <fstream>
-#include <sstream>
 
 #include "tests/segmentation/dicom_files.h"
-#include "tests/segmentation/image_files.h"
+#include "tests/segmentation/segment_fixture.h"
 
 // What the executable says about a DICOM series that contradicts the case, and about recipes that leave nothing.
 namespace supine::segmentation {
@@ -17,68 +12,32 @@ namespace {
 using namespace testing;
 namespace fs = std::filesystem;
 
-constexpr const char* block_recipe = R"([segmentation]
-[[segmentation.step]]
-do = "threshold"
-mask = "fat"
-lower = 60
-[[segmentation.step]]
+const std::string block_recipe = std::string("[segmentation]\n") + fat_step + R"([[segmentation.step]]
 do = "threshold"
 mask = "muscle"
 lower = 10
 upper = 59
-[[segmentation.step]]
-do = "paint"
-mask = "fat"
-tissue = "adipose"
-[[segmentation.step]]
-do = "paint"
-mask = "muscle"
-tissue = "muscle"
-)";
+)" + paint_steps;
 
-class SegmentDicom : public ::testing::Test {
+class SegmentDicom : public SegmentFixture {
  protected:
-  void SetUp() override {
-    if (!fs::exists(tool())) GTEST_SKIP() << tool() << " is not built";
-    image_.grid.size = {10, 10, 10};
-    image_.grid.spacing_mm = {2, 2, 2};
-    image_.voxels.assign(1000, 3);  // the writer's rescale makes grey = 2 value - 5: air 1, muscle 35, fat 95
-    for (int k = 1; k < 9; ++k)
-      for (int j = 1; j < 9; ++j)
-        for (int i = 1; i < 9; ++i) image_.at(i, j, k) = j > 6 ? 20 : 50;
-    fs::create_directory(folder_ / "dicom");
-  }
-  static fs::path tool() { return fs::path(SUPINE_BIN_DIR) / "supine-segment"; }
   void write_series(const std::string& position, const std::string& laterality) const {
     SeriesHeader header;
     header.position = position;
     header.laterality = laterality;
+    fs::create_directory(folder_ / "dicom");
     write_dicom_series(folder_ / "dicom", image_, header);
   }
   /// Exit code of the tool on a case with this side, prone gravity and recipe.
-  int run(const std::string& side, double gravity_y, const std::string& recipe = block_recipe) {
+  int run(const std::string& side, double gravity_y, const std::string& recipe = block_recipe) const {
     write_text(
         folder_ / "case.toml",
         fmt::format("[case]\nname = \"t\"\nframe = \"LPS\"\nside = \"{}\"\n[image]\nfile = \"dicom\"\nkind = "
                     "\"mri\"\n[pose.prone]\ngravity = [0.0, {}, 0.0]\n[pose.supine]\ngravity = [0.0, {}, 0.0]\n{}",
                     side, gravity_y, -gravity_y, recipe));
-    const std::string command = fmt::format("{} {} --force >{} 2>{}", tool().string(), folder_.path().string(),
-                                            (folder_ / "stdout").string(), (folder_ / "stderr").string());
-    return WEXITSTATUS(std::system(command.c_str()));
+    return SegmentFixture::run("--force");
   }
-  std::string errors() const {
-    std::ostringstream text;
-    text << std::ifstream(folder_ / "stderr").rdbuf();
-    return text.str();
-  }
-  void expect_refused(int code, const std::string& because) const {
-    EXPECT_EQ(code, 2);
-    EXPECT_NE(errors().find(because), std::string::npos) << errors();
-    EXPECT_FALSE(fs::exists(folder_ / "out" / "labels.vti"));
-  }
-  TemporaryFolder folder_;
-  GreyImage image_;
+  const GreyImage image_ = block(3, 50, 20);  // the writer's rescale makes grey = 2 value - 5: air 1, fat 95, muscle 35
 };
 
 TEST_F(SegmentDicom, AcceptsAProneSeriesThatFitsTheCase) {
