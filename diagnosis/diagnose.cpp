@@ -58,7 +58,7 @@ double p_of(const ScoreTable& table) {
 
 /// Whether the p of the effect is proof enough: held-out blocks of skin cannot show what lies under one block alone.
 bool is_sure(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
-  if (refit.bic < rules.bic || p_of_effect(table, refit.effect) > rules.sure_p || !leaves_out_null(refit)) return false;
+  if (p_of_effect(table, refit.effect) > rules.sure_p || !leaves_out_null(refit)) return false;
   // A scan that lies elsewhere says nothing of where another one lies.
   const bool poses = refit.effect != "misregistration" && !refit.pose_rms_mm.empty() &&
                      refit.pose_rms_mm.size() == base.pose_rms_mm.size();
@@ -72,7 +72,8 @@ std::vector<const Refit*> counting(const ScoreTable& table, const std::vector<Re
                                    const std::vector<LackOfFit>& left, const BaseFigures& base,
                                    const VerdictRules& rules) {
   const auto counts = [&](const Refit& refit) {
-    return refit.finished && refit.bic > 0 &&
+    // The model as it is has b = 0: what does not stand out from that either is not named.
+    return refit.finished && refit.bic >= rules.bic &&
            (improves(refit.held_out_rms_mm, base, rules) || is_sure(refit, table, base, rules));
   };
   std::vector<const Refit*> good;

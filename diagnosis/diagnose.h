@@ -53,8 +53,8 @@ struct Diagnosis {
 };
 
 /// nothing_missing  no score that chance would not give (p), or nothing that lowers the held-out error
-/// missing          one refit counts and no other comes near. A refit counts that beats its penalty and lowers the
-///                  held-out error; or one that beats it by `bic`, whose own p is below sure_p, whose interval leaves
+/// missing          one refit counts and no other comes near. A refit counts that beats its penalty by `bic` and
+///                  lowers the held-out error; or, instead of that, whose own p is below sure_p, whose interval leaves
 ///                  out its null and that lowers the error of a pose that was not fitted, where there is one: blocks of
 ///                  skin that are predicted without themselves cannot show what lies under one of them alone
 /// ambiguous        several do, measurement effects first

@@ -100,9 +100,12 @@ class Scorer {
     return maxima;
   }
 
-  double correlation(std::size_t a, std::size_t b) const {
-    const Eigen::MatrixXd product = projected_[a].direction.transpose() * projected_[b].direction;
-    return Eigen::JacobiSVD<Eigen::MatrixXd>(product).singularValues()[0];
+  Eigen::MatrixXd alike() const {
+    const auto count = static_cast<Eigen::Index>(projected_.size());
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(count, count);
+    for (Eigen::Index a = 0; a < count; ++a)
+      for (Eigen::Index b = 0; b < a; ++b) matrix(a, b) = matrix(b, a) = correlation(projected_[a], projected_[b]);
+    return matrix;
   }
 
   double held_out_rms(const Eigen::VectorXd& distance, const Eigen::MatrixXd& slope) const {
@@ -112,6 +115,11 @@ class Scorer {
   }
 
  private:
+  static double correlation(const Projected& a, const Projected& b) {
+    const Eigen::MatrixXd product = a.direction.transpose() * b.direction;
+    return product.size() == 0 ? 0 : Eigen::JacobiSVD<Eigen::MatrixXd>(product).singularValues()[0];
+  }
+
   static double statistic_along_slope(const Projected& p, const Eigen::VectorXd& d) {
     const bool wrong = p.one_sided && p.slope.col(0).dot(d) > 0;
     return wrong ? 0 : (p.direction.transpose() * d).squaredNorm();
@@ -166,13 +174,15 @@ ScoreTable score_candidates(const Residuals& residuals, const Eigen::MatrixXd& s
   table.base_rms_mm = rms(residuals.distance_mm);
   table.base_held_out_rms_mm = scorer.held_out_rms(residuals.distance_mm, slope);
   table.effective_points = whitening.effective_points();
+  table.alike = scorer.alike();
+  for (const Candidate& candidate : candidates) table.effects.push_back(candidate.effect);
   const std::vector<double> maxima = scorer.null_maxima(seed);
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     Score score = scorer.score(c);
     const auto higher = std::count_if(maxima.begin(), maxima.end(), [&score](double b) { return b >= score.bic; });
     score.p_value = static_cast<double>(1 + higher) / static_cast<double>(1 + maxima.size());
     for (std::size_t other = 0; other < candidates.size(); ++other)
-      if (other != c && scorer.correlation(c, other) > same_direction)
+      if (other != c && table.alike(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(other)) > same_direction)
         score.not_told_apart_from.push_back(candidates[other].effect);
     table.scores.push_back(std::move(score));
   }

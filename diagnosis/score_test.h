@@ -36,6 +36,10 @@ struct ScoreTable {
   double base_rms_mm;
   double base_held_out_rms_mm;
   double effective_points;
+  std::vector<std::string> effects;  ///< in the order of the candidates
+  /// Largest canonical correlation of each two effects (sign aside) under Σ, what recalibration can absorb taken out: 1
+  /// = this measurement cannot tell them apart.
+  Eigen::MatrixXd alike;
 };
 
 /// Projected score test (Rao's; Lagrange multiplier) of every candidate. With d̃ = L⁻¹d, S̃ = L⁻¹S and Q an orthonormal

@@ -84,6 +84,15 @@ Json candidate_json(const Findings& found, const Score& score) {
           {"power", score.power}};
 }
 
+Json alike_json(const diagnosis::ScoreTable& table) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < table.alike.rows(); ++i) {
+    const Eigen::VectorXd row = table.alike.row(i);
+    rows.push_back(std::vector<double>(row.begin(), row.end()));
+  }
+  return {{"effects", table.effects}, {"correlation", rows}};
+}
+
 Json left_json(const diagnosis::LackOfFit& left) { return {{"misfit", left.misfit}, {"p_value", left.p_value}}; }
 
 Json budget_json(const diagnosis::ErrorBudget& b) {
@@ -158,6 +167,16 @@ std::string where(const std::vector<diagnosis::HotSpot>& spots) {
   return text.empty() ? "nowhere by more than noise" : text;
 }
 
+/// ", unfitted pose 1.17 -> 0.92 mm"; empty where there is none.
+std::string pose_fall(const Findings& found, const Refit& refit) {
+  const auto& before = found.figures.pose_rms_mm;
+  if (before.empty() || before.size() != refit.pose_rms_mm.size()) return {};
+  std::string text = before.size() == 1 ? ", unfitted pose" : ", unfitted poses";
+  for (std::size_t i = 0; i < before.size(); ++i)
+    text += fmt::format("{} {:.2f} -> {:.2f}", i > 0 ? "," : "", before[i], refit.pose_rms_mm[i]);
+  return text + " mm";
+}
+
 void say_verdict(const Run& run, const Findings& found) {
   const diagnosis::Diagnosis& d = found.diagnosis;
   const std::string names = fmt::format("{}", fmt::join(d.missing, " or "));
@@ -168,8 +187,9 @@ void say_verdict(const Run& run, const Findings& found) {
       run.say(fmt::format("  nothing missing: {}", d.why));
       break;
     case Verdict::missing:
-      run.say(fmt::format("  missing:  {}   held-out {:.2f} -> {:.2f} mm   p {:.3f}   {}", names,
-                          found.figures.held_out_rms_mm, best->held_out_rms_mm, p, values_of(best->parameters)));
+      run.say(fmt::format("  missing:  {}   held-out {:.2f} -> {:.2f} mm{}   p {:.3f}   {}", names,
+                          found.figures.held_out_rms_mm, best->held_out_rms_mm, pose_fall(found, *best), p,
+                          values_of(best->parameters)));
       break;
     case Verdict::ambiguous:
       run.say(fmt::format("  missing, cannot be told apart: {}   p {:.3f}", names, p));
@@ -270,6 +290,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
                                      {"closest_pair", next.closest_pair},
                                      {"mean_power_of_unseen", next.single_power},
                                      {"shows", next.shows}});
+  f["alike"] = alike_json(found.table);
   f["missing_force"] = forces_json(found);
   f["effective_points"] = found.table.effective_points;
   f["noise_mm"] = found.figures.noise_mm;

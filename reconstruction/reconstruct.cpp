@@ -3,14 +3,12 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "common/error.h"
-#include "reconstruction/fairing.h"
-#include "reconstruction/mesh_edges.h"
 #include "reconstruction/prongs.h"
+#include "reconstruction/shaping.h"
 
 namespace supine::reconstruction {
 namespace {
@@ -19,101 +17,13 @@ using segmentation::LabelImage;
 using segmentation::Tissue;
 
 constexpr double default_smooth_voxels = 0.75;
-constexpr double largest_offset_voxels = 0.5;  // fairing cannot shrink by more
-constexpr double negligible_volume = 1e-4;
 constexpr Tissue organ_tissues[] = {Tissue::gland, Tissue::tumour, Tissue::nipple, Tissue::vessel};
 
-struct PieceSizes {
-  std::vector<double> volume_mm3, area_mm2;
-};
-
-PieceSizes measure_pieces(const VoxelSurface& voxels, const Surface& surface) {
-  PieceSizes sizes{std::vector<double>(voxels.piece_volume_mm3.size(), 0.0), {}};
-  sizes.area_mm2 = sizes.volume_mm3;
-  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
-    const int piece = voxels.piece(surface.triangles(t, 0));
-    const Eigen::RowVector3d a = surface.points.row(surface.triangles(t, 0)),
-                             b = surface.points.row(surface.triangles(t, 1)),
-                             c = surface.points.row(surface.triangles(t, 2));
-    sizes.volume_mm3[piece] += a.dot(b.cross(c)) / 6;
-    sizes.area_mm2[piece] += 0.5 * (b - a).cross(c - a).norm();
-  }
-  return sizes;
-}
-
-void offset_pieces(const VoxelSurface& voxels, const std::vector<double>& step_mm, Surface& surface) {
-  const Points normals = point_normals(surface.points, surface.triangles);
-  for (Eigen::Index p = 0; p < normals.rows(); ++p) surface.points.row(p) += step_mm[voxels.piece(p)] * normals.row(p);
-}
-
-// Moves every piece along its normals until it has the volume of its voxels, as far as the bound allows; what is then
-// missing of the whole is made up by all pieces that are not at the bound.
-void restore_volume(const VoxelSurface& voxels, double bound_mm, Surface& surface) {
-  const std::size_t pieces = voxels.piece_volume_mm3.size();
-  std::vector<double> offset_mm(pieces, 0.0), step_mm(pieces, 0.0);
-  for (int round = 0; round < 3; ++round) {
-    const PieceSizes sizes = measure_pieces(voxels, surface);
-    for (std::size_t i = 0; i < pieces; ++i) {
-      const double wanted = offset_mm[i] + (voxels.piece_volume_mm3[i] - sizes.volume_mm3[i]) / sizes.area_mm2[i];
-      step_mm[i] = std::clamp(wanted, -bound_mm, bound_mm) - offset_mm[i];
-      offset_mm[i] += step_mm[i];
-    }
-    offset_pieces(voxels, step_mm, surface);
-  }
-  const PieceSizes sizes = measure_pieces(voxels, surface);
-  double missing = voxels.voxel_volume_mm3(), area = 0;
-  for (std::size_t i = 0; i < pieces; ++i) {
-    missing -= sizes.volume_mm3[i];
-    if (std::abs(offset_mm[i]) < bound_mm) area += sizes.area_mm2[i];
-  }
-  if (area <= 0 || std::abs(missing) < negligible_volume * voxels.voxel_volume_mm3()) return;
-  const double common_mm = std::clamp(missing / area, -0.5 * bound_mm, 0.5 * bound_mm);
-  for (std::size_t i = 0; i < pieces; ++i) step_mm[i] = std::abs(offset_mm[i]) < bound_mm ? common_mm : 0;
-  offset_pieces(voxels, step_mm, surface);
-}
-
-// Halves the displacement from the staircase around crossings until there are none. @return points that were held back
-Eigen::Index remove_crossings(const Points& staircase, Surface& surface) {
-  const Points displacement = surface.points - staircase;
-  const auto neighbours = point_neighbours(mesh_edges(surface.triangles), surface.points.rows());
-  Eigen::VectorXd share = Eigen::VectorXd::Ones(surface.points.rows());
-  constexpr int most_rounds = 40;
-  for (int round = 0; round < most_rounds; ++round) {
-    const auto crossings = self_intersections(surface);
-    if (crossings.empty()) return (share.array() < 1).count();
-    std::vector<char> hit(surface.points.rows(), 0);
-    for (const auto& [a, b] : crossings)
-      for (int c = 0; c < 3; ++c) hit[surface.triangles(a, c)] = hit[surface.triangles(b, c)] = 1;
-    const std::vector<char> core = hit;
-    for (std::size_t p = 0; p < core.size(); ++p)
-      if (core[p])
-        for (const int n : neighbours[p]) hit[n] = 1;
-    for (std::size_t p = 0; p < hit.size(); ++p)
-      if (hit[p]) share(static_cast<Eigen::Index>(p)) *= round < most_rounds / 2 ? 0.5 : 0;
-    surface.points = staircase + displacement.cwiseProduct(share.replicate<1, 3>());
-  }
-  const auto crossings = self_intersections(surface);
-  if (!crossings.empty())
-    throw NumericalFailure(
-        fmt::format("the smoothed surface crosses itself in {} places and could not be repaired; give a "
-                    "smaller --smooth-mm",
-                    crossings.size()));
-  return (share.array() < 1).count();
-}
-
-OrganSurface finish(std::string name, const VoxelSurface& voxels, Eigen::VectorXi region, const LabelImage& image,
-                    const ReconstructOptions& options) {
+OrganSurface finished(std::string name, const VoxelSurface& voxels, ShapedSurface shaped, const LabelImage& image) {
   OrganSurface organ;
   organ.name = std::move(name);
-  Surface surface = voxels.surface;
-  surface.region = std::move(region);
-  FairingOptions fairing;
-  fairing.spacing_mm = image.grid.spacing_mm;
-  fairing.length_mm = options.smooth_mm.value_or(default_smooth_voxels * image.grid.spacing_mm.maxCoeff());
-  surface.points = fair(surface, fairing);
-  restore_volume(voxels, largest_offset_voxels * image.grid.spacing_mm.minCoeff(), surface);
-  organ.less_smooth_points = remove_crossings(voxels.surface.points, surface);
-  organ.surface = to_patient(std::move(surface), image.grid);
+  organ.less_smooth_points = shaped.less_smooth_points;
+  organ.surface = to_patient(std::move(shaped.surface), image.grid);
   organ.report = check_surface(organ.surface);
   organ.self_intersections = self_intersections(organ.surface).size();
   organ.voxel_volume_mm3 = voxels.voxel_volume_mm3();
@@ -122,6 +32,16 @@ OrganSurface finish(std::string name, const VoxelSurface& voxels, Eigen::VectorX
   organ.dropped_pieces = voxels.dropped_pieces;
   organ.dropped_volume_mm3 = voxels.dropped_volume_mm3;
   return organ;
+}
+
+ShapingOptions shaping(const LabelImage& image, const ReconstructOptions& options) {
+  const Eigen::Vector3d& spacing_mm = image.grid.spacing_mm;
+  return {spacing_mm, options.smooth_mm.value_or(default_smooth_voxels * spacing_mm.maxCoeff())};
+}
+
+OrganSurface finish(std::string name, const VoxelSurface& voxels, const LabelImage& image,
+                    const ReconstructOptions& options) {
+  return finished(std::move(name), voxels, shape_together({&voxels}, shaping(image, options)).front(), image);
 }
 
 // A coarser mask of one tissue: blocks of voxels count as in above the share that keeps the volume best.
@@ -154,20 +74,47 @@ LabelImage in_blocks(const LabelImage& image, Tissue tissue, int factor) {
   return coarse;
 }
 
-std::optional<OrganSurface> organ_surface(const LabelImage& image, Tissue tissue, const ReconstructOptions& options) {
-  const VoxelSurface fine = voxel_surface(image, only(tissue));
-  if (fine.surface.triangles.rows() == 0) return std::nullopt;
-  const std::string name(segmentation::tissue_names[static_cast<int>(tissue)]);
-  const double excess = static_cast<double>(fine.surface.triangles.rows()) / options.most_organ_triangles;
-  if (excess <= 1) return finish(name, fine, {}, image, options);
-  const LabelImage coarse = in_blocks(image, tissue, static_cast<int>(std::ceil(std::sqrt(excess))));
+OrganSurface organ_from_blocks(std::string name, const VoxelSurface& fine, const LabelImage& coarse, Tissue tissue,
+                               const ReconstructOptions& options) {
   VoxelSurface blocks = voxel_surface(coarse, only(tissue));
   const double scale = fine.voxel_volume_mm3() / blocks.voxel_volume_mm3();
   for (double& volume : blocks.piece_volume_mm3) volume *= scale;  // what the blocks miss is given back by the offset
-  OrganSurface organ = finish(name, blocks, {}, coarse, options);
+  OrganSurface organ = finish(std::move(name), blocks, coarse, options);
   organ.voxel_volume_mm3 = fine.voxel_volume_mm3();
   organ.voxel_components = static_cast<int>(fine.piece_volume_mm3.size());
   return organ;
+}
+
+std::vector<OrganSurface> organ_surfaces(const LabelImage& image, const ReconstructOptions& options) {
+  std::vector<OrganSurface> organs;
+  std::vector<VoxelSurface> fine;  // those with their own voxels, and where they belong
+  std::vector<std::size_t> place;
+  for (const Tissue tissue : organ_tissues) {
+    VoxelSurface voxels = voxel_surface(image, only(tissue));
+    if (voxels.surface.triangles.rows() == 0) continue;
+    const std::string name(segmentation::tissue_names[static_cast<int>(tissue)]);
+    const double excess = static_cast<double>(voxels.surface.triangles.rows()) / options.most_organ_triangles;
+    if (excess > 1) {
+      const LabelImage coarse = in_blocks(image, tissue, static_cast<int>(std::ceil(std::sqrt(excess))));
+      organs.push_back(organ_from_blocks(name, voxels, coarse, tissue, options));
+      continue;
+    }
+    place.push_back(organs.size());
+    organs.emplace_back().name = name;
+    fine.push_back(std::move(voxels));
+  }
+  std::vector<const VoxelSurface*> all;
+  for (const VoxelSurface& voxels : fine) all.push_back(&voxels);
+  for (const std::vector<int>& group : touching_groups(all)) {
+    std::vector<const VoxelSurface*> members;
+    for (const int n : group) members.push_back(all[n]);
+    std::vector<ShapedSurface> shaped = shape_together(members, shaping(image, options));
+    for (std::size_t m = 0; m < group.size(); ++m) {
+      OrganSurface& organ = organs[place[group[m]]];
+      organ = finished(organ.name, *members[m], std::move(shaped[m]), image);
+    }
+  }
+  return organs;
 }
 
 void require_tissues(const LabelImage& image) {
@@ -226,14 +173,14 @@ Reconstruction reconstruct(const LabelImage& image, const ReconstructOptions& op
   Reconstruction result;
   LabelImage without_prongs = image;
   const double prong_volume_mm3 = turn_prongs_into_muscle(without_prongs, options.thinnest_mm);
-  const VoxelSurface breast = voxel_surface(without_prongs, meshed_tissues(), options.smallest_piece_mm3);
-  result.breast = finish("breast", breast, regions_of(breast, without_prongs, options.cut), without_prongs, options);
+  VoxelSurface breast = voxel_surface(without_prongs, meshed_tissues(), options.smallest_piece_mm3);
+  breast.surface.region = regions_of(breast, without_prongs, options.cut);
+  result.breast = finish("breast", breast, without_prongs, options);
   result.breast.prong_volume_mm3 = prong_volume_mm3;
   result.muscle = reversed_region(result.breast.surface, Region::inner);
   if (result.muscle.triangles.rows() == 0)
     throw InputError("no tissue to be meshed borders on the muscle; check the labels of muscle and of what lies on it");
-  for (const Tissue tissue : organ_tissues)
-    if (auto organ = organ_surface(image, tissue, options)) result.organs.push_back(std::move(*organ));
+  result.organs = organ_surfaces(image, options);
   return result;
 }
 

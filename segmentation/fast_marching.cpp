@@ -24,9 +24,9 @@ constexpr float not_solved = -1, given_back = -2;
 /// A voxel beside the front, one cache line: all that its arrival time depends on, so that no stencil is gathered.
 struct alignas(64) BandVoxel {
   UpwindSides sides;
-  float slowness = 0;
-  float time = not_solved;  ///< the last solution, which the entry in the queue must agree with
-  std::uint32_t voxel = 0;
+  float slowness;
+  float time;  ///< the last solution, which the entry in the queue must agree with
+  std::uint32_t voxel;
 };
 
 /// Records of the voxels beside the front; a number given back is used again.
@@ -41,17 +41,19 @@ class Band {
     } else {
       record = free_.back();
       free_.pop_back();
-      records_[record] = {};
     }
-    records_[record].slowness = slowness;
-    records_[record].voxel = voxel;
+    BandVoxel& taken = records_[record];
+    taken.sides.forget();
+    taken.slowness = slowness;
+    taken.time = not_solved;
+    taken.voxel = voxel;
     return record;
   }
   void give_back(std::uint32_t record) {
     records_[record].time = given_back;
     free_.push_back(record);
   }
-  void prefetch(std::uint32_t record) const { __builtin_prefetch(&records_[record]); }
+  void prefetch(std::uint32_t record) const { fetch_ahead(&records_[record]); }
   bool is_current(FrontQueue::Entry entry) const {
     return std::bit_cast<std::uint32_t>(records_[entry.item()].time) == entry.time_bits();
   }
@@ -229,7 +231,7 @@ class FrontRun {
     const auto next = queue_.ahead();
     if (next.size() > 24) band_.prefetch(next[24].item());
     if (next.size() > 12 && band_.is_current(next[12]))
-      for (const std::uint32_t n : front_.neighbours(band_[next[12].item()].voxel)) __builtin_prefetch(&front_[n]);
+      for (const std::uint32_t n : front_.neighbours(band_[next[12].item()].voxel)) fetch_ahead(&front_[n]);
     if (next.size() > 5 && band_.is_current(next[5]))
       for (const std::uint32_t n : front_.neighbours(band_[next[5].item()].voxel))
         if (front_[n].is_in_band()) band_.prefetch(front_[n].record());

@@ -24,13 +24,14 @@ struct FastMarchingOptions {
 };
 
 /// Arrival time of a front that leaves the sources and moves with the given speed: the solution of |grad T| = 1 / speed
-/// by fast marching (J. A. Sethian 1999, section 8.3 first and 8.9 second order) with a bucket queue (L. Yatziv,
-/// A. Bartesaghi and G. Sapiro 2006) in which a voxel is opened again when it falls within its own bucket. Voxels may
-/// be anisotropic; the grid may be oblique.
+/// by fast marching (J. A. Sethian 1999, section 8.3 first and 8.9 second order) in the exact order of the times. A
+/// voxel is first solved for when it might pass at the earliest: no sooner than 1 / (v sqrt(sum 1 / h^2)) after its
+/// first neighbour, v the greatest speed (two thirds of that in second order). Voxels may be anisotropic; the grid may
+/// be oblique. The result does not depend on the number of threads.
 /// @param speed  mm per unit of time, finite and >= 0; a front does not enter voxels of speed 0
 /// @return time per voxel; infinity where the front did not come before stop_time
-/// @throws InputError  options out of range; no source; a source outside the image (in mm, with the image's box) or
-/// where
+/// @throws InputError  options out of range; more than about 4e9 voxels; no source; a source outside the image (in mm,
+/// with the image's box) or where
 ///   the speed is 0 (in mm); a negative or not finite speed (voxel)
 Image<float> fast_march(const Image<float>& speed, std::span<const FrontSource> sources,
                         const FastMarchingOptions& options);

@@ -12,9 +12,9 @@
 namespace supine::segmentation {
 
 /// What falls due at times >= 0 that are never before the last one taken, in the exact order of the times; equal times
-/// in an order that depends only on the calls. Buckets are runs of neighbouring float numbers, 4096 to a factor of two,
-/// so that there is no width to choose; a bucket is sorted when it is opened. Entries of the present factor of two lie
-/// in their buckets, later ones wait in one list per factor of two.
+/// in an order that depends only on the calls. Buckets are runs of neighbouring float numbers, 16384 to a factor of
+/// two, so that there is no width to choose; a bucket is sorted when it is opened. Entries of the present factor of two
+/// lie in their buckets, later ones wait in one list per factor of two.
 class FrontQueue {
  public:
   struct Entry {
@@ -64,7 +64,7 @@ class FrontQueue {
   std::span<const Entry> ahead() const { return std::span(open_).subspan(head_); }
 
  private:
-  static constexpr int slot_bits = 12, bucket_shift = 23 - slot_bits;
+  static constexpr int slot_bits = 14, bucket_shift = 23 - slot_bits;
   static constexpr std::uint32_t slot_count = 1u << slot_bits, octave_count = 256;
   /// Lists are chains of blocks from one store: a list that was used up leaves its memory to the next.
   struct Block {

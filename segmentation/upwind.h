@@ -11,10 +11,15 @@ namespace supine::segmentation {
 /// What a voxel knows of the fronts that reached its neighbours, per axis: the difference along the axis is
 /// sqrt(weight) (T - base) once the front has passed the neighbour at time `from`.
 struct UpwindSides {
-  std::array<float, 3> from;              ///< infinity where no front came
-  std::array<float, 3> base{}, weight{};  ///< 0 where no front came
-  UpwindSides() { from.fill(std::numeric_limits<float>::infinity()); }
+  std::array<float, 3> from;          ///< infinity where no front came
+  std::array<float, 3> base, weight;  ///< 0 where no front came
 
+  void forget() {
+    for (int axis = 0; axis < 3; ++axis) {
+      from[axis] = std::numeric_limits<float>::infinity();
+      base[axis] = weight[axis] = 0;
+    }
+  }
   bool known(int axis) const { return from[axis] < std::numeric_limits<float>::infinity(); }
   /// (T - nearest) / h. @param inverse_squared  1 / h^2
   void set_first_order(int axis, float nearest, float inverse_squared) {

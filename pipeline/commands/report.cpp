@@ -7,7 +7,6 @@
 #include "pipeline/provenance.h"
 #include "pipeline/report/answer.h"
 #include "pipeline/report/collect.h"
-#include "pipeline/report/likeness.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/shapes.h"
 #include "pipeline/report/stages.h"
@@ -54,7 +53,6 @@ class ReportTool : public Tool {
     data["figures"] = collected.figures;
     data["texts"] = collected.texts;
     data["pictures"] = collected.pictures;
-    data["alike"] = likeness(run, collected, places);
     data["shapes"] = shapes(run, measured, collected, places);
     data["view3d"] = view3d_remark(run);
     run.stage("write");
@@ -110,12 +108,6 @@ class ReportTool : public Tool {
     if (no_view3d_) return nullptr;
     const Json& ladder = collected.first({"ladder/ladder.json", "ladder.json"});
     return shapes_json(run, measured, places.out, find_states(places.out, ladder));
-  }
-
-  static Json likeness(Run& run, const Collected& collected, const Places& places) {
-    const char* folder = collected.find("diagnosis.json").is_null() ? "ladder" : "";
-    const fs::path file = places.out / folder / "diagnosis.vtp";
-    return fs::exists(file) ? likeness_json(run.input(file)) : Json(nullptr);
   }
 
   /// Why there is no 3-D view; empty when there is.

@@ -57,13 +57,16 @@ Json error_of(const Collected& collected) {
   return nullptr;
 }
 
-/// "lateral edge -1.5 mm (49 cm²)" for the largest few.
+/// With a sign that is as wide as the plus.
+std::string signed_mm(double value) { return fmt::format("{}{:.1f} mm", value < 0 ? "−" : "+", std::abs(value)); }
+
+/// "lateral edge −1.5 mm (49 cm²)" for the largest few.
 std::string where(const Json& diagnosis) {
   std::string text;
   const Json spots = diagnosis.value("hot_spots", Json::array());
   for (std::size_t s = 0; s < std::min<std::size_t>(3, spots.size()); ++s)
-    text += fmt::format("{}{} {:+.1f} mm ({:.0f} cm²)", s > 0 ? ", " : "", spots[s].value("area", "?"),
-                        number(spots[s], "mean_signed_mm"), number(spots[s], "area_cm2"));
+    text += fmt::format("{}{} {} ({:.0f} cm²)", s > 0 ? ", " : "", spots[s].value("area", "?"),
+                        signed_mm(number(spots[s], "mean_signed_mm")), number(spots[s], "area_cm2"));
   return text;
 }
 

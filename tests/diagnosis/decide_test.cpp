@@ -35,6 +35,11 @@ TEST(Decide, NamesTheOneThatStandsOut) {
   EXPECT_EQ(d.missing, Names{"ligament"});
 }
 
+TEST(Decide, WhatCannotBeToldFromNothingIsNotNamed) {
+  EXPECT_EQ(verdict({refit("ligament", 5, 0.8)}).verdict, Verdict::unexplained);
+  EXPECT_EQ(verdict({refit("ligament", 7, 0.8)}).verdict, Verdict::missing);
+}
+
 TEST(Decide, NamesAllThatDoAsWellMeasurementFirst) {
   const Diagnosis d = verdict({refit("adhesion", 60, 0.8), refit("misregistration", 57, 0.8)});
   EXPECT_EQ(d.verdict, Verdict::ambiguous);

@@ -122,6 +122,22 @@ TEST(ScoreTest, SameDirectionIsNotToldApart) {
   EXPECT_TRUE(score_of(table, "ring").not_told_apart_from.empty());
 }
 
+TEST(ScoreTest, AlikeIsTheCorrelationOfWhatRecalibrationLeaves) {
+  const Residuals r = sheet(6);
+  auto candidates = catalogue_of(r);
+  candidates.push_back(candidate("tilted", candidates[0].slope + 5 * fitted_slopes(r).col(1)));
+  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  EXPECT_EQ(table.effects, (std::vector<std::string>{"wave", "pair", "ring", "tilted"}));
+  EXPECT_NEAR(table.alike(0, 3), 1, 1e-9) << "all that tilted has beside the wave is absorbed";
+  const Eigen::MatrixXd& s = fitted_slopes(r);
+  const auto freed = [&s](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    return v - s * s.colPivHouseholderQr().solve(v);
+  };
+  const Eigen::VectorXd wave = freed(candidates[0].slope), ring = freed(candidates[2].slope);
+  EXPECT_NEAR(table.alike(0, 2), std::abs(wave.normalized().dot(ring.normalized())), 1e-9);
+  EXPECT_TRUE(table.alike.isApprox(table.alike.transpose()));
+}
+
 TEST(ScoreTest, PowerIsThatOfTheNoncentralChiSquared) {
   // Central: 5 %. λ with a power of 80 % (tables of the noncentral χ²): 7.849 (q = 1), 9.635 (2), 10.903 (3), 13.624
   // (6).

@@ -7,17 +7,18 @@
 
   const interval = (p) =>
     `${supine.parameter(p.name.split(".").pop())} ${sensible(p.value)} [${sensible(p.interval95[0])}, ${sensible(p.interval95[1])}]${p.unit === "1" ? "" : " " + p.unit}`;
+  // Sign and size are remarked on where the size is that of one step: a fit stays within the range.
   const rows_of = (d) => d.candidates.map((c) => ({ ...c, name: words(c.effect), sizes: c.parameters.map(interval),
     predicted_fall_mm: d.base_rms_mm - c.predicted_rms_mm, refit_fall_mm: c.refit_rms_mm === null ? null : d.base_rms_mm - c.refit_rms_mm,
     apart: c.not_told_apart_from.map(words).join(", "),
-    note: [c.wrong_sign ? "wrong sign" : "", c.beyond_range ? "implausible size" : "", c.refit_finished === false ? "fit given up early" : ""].filter(Boolean).join(", ") }));
+    note: [c.refit_rms_mm === null && c.wrong_sign ? "wrong sign" : "", c.refit_rms_mm === null && c.beyond_range ? "implausible size" : "", c.refit_finished === false ? "fit given up early" : ""].filter(Boolean).join(", ") }));
 
   const columns = [
     { title: "effect", key: "name" }, { title: "p", key: "p_value", n: true, show: p_value },
     { title: "fall predicted, mm", key: "predicted_fall_mm", digits: 2 }, { title: "fall after the fit, mm", key: "refit_fall_mm", digits: 2 },
     { title: "skin left out, mm", key: "held_out_rms_mm", digits: 2 }, { title: "power", key: "power", digits: 2 },
     { title: "size [95 %]", key: "sizes", show: (list) => el("div", {}, list.map((line) => el("div", { class: "whole" }, line))) },
-    { title: "not told apart from", key: "apart" }, { title: "", key: "note" }];
+    { title: "not told apart from", key: "apart" }, { title: "remark", key: "note" }];
 
   // Predicted and actual error of each candidate, from the base down.
   const falls = (d, rows) => {
@@ -56,27 +57,27 @@
         caption: low ? `Grey: ${low} effects that this scan would more likely miss than find. That they were not named says nothing.` : "" });
   };
 
-  // How alike the marks of two effects are on this scan: absolute correlation of their shapes.
-  const alike = () => {
-    const a = data.alike;
+  // How alike the marks of two effects are on this scan, when the free parameters have taken their share.
+  const alike = (d) => {
+    const a = d.alike;
     if (!a || a.effects.length < 2) return "";
     const n = a.effects.length, size = 22, left = 150, top = 130;
-    const rows = a.effects.flatMap((one, i) => a.effects.map((other, j) => ({ effect: one, other, alike: a.cosine[i][j] })));
-    const shade = (v) => `color-mix(in srgb, var(--c1) ${Math.round(100 * Math.abs(v))}%, var(--paper))`;
+    const rows = a.effects.flatMap((one, i) => a.effects.map((other, j) => ({ effect: one, other, alike: a.correlation[i][j] })));
+    const shade = (v) => `color-mix(in srgb, var(--c1) ${Math.round(100 * v)}%, var(--paper))`;
     const cells = rows.map((r, k) => {
       const i = Math.floor(k / n), j = k % n;
       return node("rect", { x: left + size * j, y: top + size * i, width: size - 1, height: size - 1, style: `fill:${shade(r.alike)}` },
         node("title", {}, `${words(r.effect)} and ${words(r.other)}: ${number(r.alike, 2)}`));
     });
-    const strong = rows.map((r, k) => (Math.abs(r.alike) > 0.9 && Math.floor(k / n) !== k % n
+    const strong = rows.map((r, k) => (r.alike > 0.9 && Math.floor(k / n) !== k % n
       ? node("circle", { cx: left + size * (k % n) + (size - 1) / 2, cy: top + size * Math.floor(k / n) + (size - 1) / 2, r: 3.5, style: "fill:var(--paper)" }) : ""));
     return supine.figure("alike", "How alike the effects look on this scan",
       picture(left + size * n + 20, top + size * n + 6, "Likeness of the effects' shapes on the scan", cells, strong, a.effects.map((name, i) => [
         text(left - 6, top + size * i + 15, words(name), "small end"),
         node("text", { x: 0, y: 0, class: "small", transform: `translate(${left + size * i + 15} ${top - 6}) rotate(-60)` }, words(name))])),
       { rows, columns: [{ title: "effect", key: "effect" }, { title: "other", key: "other" }, { title: "alike", key: "alike", digits: 3 }],
-        caption: "Dark: the two would move the skin in the same pattern (correlation, sign aside); a dot above 0.9. The fit of the free parameters, which " +
-          "makes some pairs more alike, is not taken out here; \"not told apart\" in the table above does that." });
+        caption: "Dark: the two would leave the same pattern on the skin once the free parameters are fitted again, weighed by all errors (canonical correlation, " +
+          "sign aside); a dot above 0.9. Refits go further than these slopes: \"not told apart\" in the table above is theirs." });
   };
 
   // A hint where no effect explains the rest.
@@ -96,6 +97,6 @@
         caption: "p: chance that errors alone score as high for any effect. Fall: by how much the RMS error shrinks, predicted by the linear score and found by the fit." }),
       el("div", { class: "columns" },
         supine.figure("falls", "Error with the effect: ◇ predicted, ● after the fit", falls(d, rows), { rows, columns: columns.slice(0, 6) }),
-        power(d), alike()), next_table(d));
+        power(d), alike(d)), next_table(d));
   };
 })();

@@ -11,7 +11,7 @@
   ];
   const with_pose = (figures) =>
     figures && { ...figures, pose: Array.isArray(figures.held_out_pose_rms_mm) ? figures.held_out_pose_rms_mm[0] : null };
-  const label = (rung, r) => (r === 0 ? "everything fitted again" : "+ " + words(rung.added));
+  const label = (rung, r) => (r === 0 ? "nothing added" : "+ " + words(rung.added));
 
   // One row per rung and control.
   const rows_of = (ladder) => {

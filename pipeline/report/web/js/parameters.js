@@ -12,7 +12,7 @@
       { title: "parameter", key: "name", show: supine.parameter }, { title: "start", key: "start", n: true, show }, { title: "fitted", key: "value", n: true, show },
       { title: "95 % from", key: "low", n: true, show }, { title: "to", key: "high", n: true, show }, { title: "unit", key: "unit" },
       { title: "", key: "at_bound", show: (v) => (v ? "at an end of its range" : "") }], rows,
-    { caption: `Interval: ${c.interval_kind}. ${(c.remarks || []).map((r) => r[0].toUpperCase() + r.slice(1)).join(". ")}.` });
+    { caption: `Interval: ${c.interval_kind}. ${(c.remarks || []).map((r) => (/^\w+[._]/.test(r) ? r : r[0].toUpperCase() + r.slice(1))).join(". ")}.` });
   };
 
   // 95 % ellipse of two parameters in the coordinates of the fit (logarithms of positive ones).

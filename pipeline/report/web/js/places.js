@@ -8,7 +8,7 @@
   const comparisons = () => {
     const models = [["", "as given"], ["calibrated/", "calibrated"]];
     const ladder = data.figures[supine.first_file("ladder/ladder.json", "ladder.json")];
-    if (ladder) ladder.rungs.forEach((rung, r) => r && models.push([`ladder/${r}/`, "+ " + supine.words(rung.added)]));
+    if (ladder) ladder.rungs.forEach((rung, r) => r && models.push([`ladder/${r}/`, "+\u00a0" + supine.words(rung.added)]));
     return models.flatMap(([folder, model]) => data.case.poses.map(({ name }) => {
       const file = `${folder}comparison${name === "supine" ? "" : "_" + name}.json`;
       return { file, model, pose: name, figures: data.figures[file] };

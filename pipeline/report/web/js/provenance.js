@@ -8,7 +8,7 @@
   const files = () => {
     const rows = Object.entries(data.figures).filter(([, f]) => f.provenance).map(([file, f]) => ({ file, tool: f.provenance.tool, version: f.provenance.version,
       commit: f.provenance.commit || "", seed: f.provenance.seed === undefined ? null : f.provenance.seed, inputs: f.provenance.inputs || [], warnings: f.warnings || [] }));
-    const short = (inputs) => el("details", {}, el("summary", {}, inputs.length + " files"), inputs.map((i) => el("div", { class: "break" }, `${i.file} `, el("code", { class: "soft" }, (i.sha256 || "").slice(0, 16)))));
+    const short = (inputs) => el("details", {}, el("summary", {}, inputs.length + (inputs.length === 1 ? " file" : " files")), inputs.map((i) => el("div", { class: "break" }, `${i.file} `, el("code", { class: "soft" }, (i.sha256 || "").slice(0, 16)))));
     const flat = rows.map((r) => ({ ...r, input_hashes: r.inputs.map((i) => `${i.file}=${i.sha256}`) }));
     const warned = rows.flatMap((r) => r.warnings.map((w) => el("div", { class: "warning" }, `${r.file}: ${w}`)));
     return [warned, supine.figure("provenance", "Files", supine.table([{ title: "file", key: "file" }, { title: "tool", key: "tool" }, { title: "version", key: "version" }, { title: "commit", key: "commit" },

@@ -52,9 +52,9 @@
     cross: (x, y, cls) => node("path", { d: `M${x - 5} ${y - 5}L${x + 5} ${y + 5}M${x - 5} ${y + 5}L${x + 5} ${y - 5}`, class: cls + " line" }),
   };
   const path = (points, cls) => node("path", { d: points.map(([x, y], i) => `${i ? "L" : "M"}${x.toFixed(1)} ${y.toFixed(1)}`).join(""), class: "line " + cls });
-  // The picture itself: its title is what a screen reader says.
+  // The picture itself: its title is what a screen reader says. Never larger than drawn, so that letters have one size.
   const picture = (width, height, title, ...children) =>
-    node("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": title }, node("title", {}, title), ...children);
+    node("svg", { viewBox: `0 0 ${width} ${height}`, style: `max-width: ${width}px`, role: "img", "aria-label": title }, node("title", {}, title), ...children);
 
   supine.svg = { node, text, line, ticks, scale, log_scale, log_ticks, bottom_axis, left_axis, marks, path, picture, digits_of };
 })();
