@@ -29,6 +29,7 @@ Eigen::VectorXd noise_of(const Residuals& residuals) {
 std::string source_of(const std::string& effect) {
   if (effect == "misregistration") return "registration";
   if (effect == "segmentation_offset") return "segmentation";
+  if (effect == "chest_wall_motion") return "chest_wall";
   if (effect == "incompressibility") return "numerical";
   return {};
 }
@@ -38,6 +39,7 @@ std::string source_of(const std::string& effect) {
 double tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& t) {
   if (effect == "misregistration") return unit == "rad" ? t.registration_rad : t.registration_mm;
   if (effect == "segmentation_offset") return t.segmentation_mm;
+  if (effect == "chest_wall_motion") return t.chest_wall_mm;
   return effect == "incompressibility" ? t.incompressibility : 0;
 }
 

@@ -16,6 +16,7 @@ struct Tolerances {
   double registration_mm = 0.3;      ///< shift of the scan, 1 sigma in each direction
   double registration_rad = 0.0036;  ///< turn of the scan: 0.3 mm at 80 mm
   double segmentation_mm = 0.3;      ///< offset of the imaged skin: a fifth of a 1.5 mm voxel
+  double chest_wall_mm = 1;          ///< the muscle between two scans: breath, and where its border was drawn
   double incompressibility = 0.25;   ///< of the catalogue's a: linear tetrahedra lock, and ν itself is assumed
   double effect_form = 0.07;  ///< of the size of a tissue effect: where it ends and how it mixes are the catalogue's
   double correction = 1;      ///< of the finer mesh's change is added to the distances, give or take the same
@@ -26,7 +27,7 @@ double tolerance_for(const std::string& effect, const std::string& unit, const T
 
 /// A shape the distances may take although nothing is missing, as large as one standard deviation.
 struct ErrorMode {
-  std::string source;  ///< registration, segmentation, numerical (incompressibility), mesh
+  std::string source;  ///< registration, segmentation, chest_wall, numerical (incompressibility), mesh
   Eigen::VectorXd shape_mm;
 };
 

@@ -23,11 +23,13 @@ void declare_png(CLI::App& app, std::filesystem::path& file, const std::string& 
 void announce_png(Run& run, const std::filesystem::path& file, const std::filesystem::path& output);
 
 /// A skin (.vtp with triangles) coloured by its point array `distance_mm`, symmetric about 0, from the front and from
-/// the outer side; grey where `covered` is 0. The largest errors are marked in mm.
+/// the outer side of every breast; grey where `covered` is 0. The largest errors are marked in mm.
 /// @param file   of calibration::write_comparison() or diagnosis::write_error_map()
 /// @param title  above the picture
+/// @param side   left, right or both
 /// @throws InputError  no display, no such array, not writable
-void draw_distances(const std::filesystem::path& file, const std::string& title, const std::filesystem::path& png);
+void draw_distances(const std::filesystem::path& file, const std::string& title, const std::string& side,
+                    const std::filesystem::path& png);
 
 /// The boundary of a tetrahedral mesh (.vtu) with its edges, coloured by `region`: from the front and from behind.
 /// @throws InputError  as above

@@ -53,7 +53,8 @@ struct Reconstruction {
 /// Marching cubes on the labels, regions from the voxel beyond, fairing within half a voxel (see fair()), and a normal
 /// offset (at most half a voxel) that gives every piece the volume of its voxels; what pieces thinner than a voxel lack
 /// is given to the others, within a quarter of a voxel. Where the result crosses itself it is taken back toward the
-/// staircase, which does not.
+/// staircase, which does not. Organs that touch are shaped together and have the vertices of their interface in common
+/// (see shape_together()), but for those made from blocks.
 /// @throws InputError  no tissue to mesh, no muscle, no part of the tissue on the muscle, or a cut that is not allowed
 ///   (see regions_of)
 Reconstruction reconstruct(const segmentation::LabelImage& image, const ReconstructOptions& options);

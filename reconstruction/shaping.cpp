@@ -35,6 +35,8 @@ struct Member {
   const VoxelSurface* voxels;
   std::vector<int> number;
   Surface surface;
+  std::vector<int> component;             ///< of every triangle
+  std::vector<double> staircase_volumes;  ///< of the components, mm^3; cavities are negative
 
   void take_points(const Points& points) {
     for (std::size_t p = 0; p < number.size(); ++p) surface.points.row(p) = points.row(number[p]);
@@ -65,30 +67,37 @@ Triangles once_each(const std::vector<std::array<int, 3>>& triangles) {
   return result;
 }
 
+Member member_of(const VoxelSurface& voxels) {
+  Member member{&voxels, {}, voxels.surface, triangle_components(voxels.surface.triangles), {}};
+  member.number.resize(static_cast<std::size_t>(voxels.surface.points.rows()));
+  std::iota(member.number.begin(), member.number.end(), 0);
+  member.staircase_volumes = component_volumes(member.surface, member.component);
+  return member;
+}
+
 Whole unite(const std::vector<const VoxelSurface*>& voxels) {
   Whole whole;
+  for (const VoxelSurface* one : voxels) whole.members.push_back(member_of(*one));
+  if (voxels.size() == 1) {
+    whole.staircase = voxels[0]->surface;
+    return whole;
+  }
   std::unordered_map<std::uint64_t, int> numbers;
   std::vector<Eigen::RowVector3d> points;
   std::vector<std::array<int, 3>> triangles;
-  for (const VoxelSurface* one : voxels) {
-    Member member{one, {}, one->surface};
-    for (Eigen::Index p = 0; p < one->surface.points.rows(); ++p) {
-      const auto [at, is_new] = numbers.try_emplace(grid_edge(*one, p), static_cast<int>(points.size()));
-      if (is_new) points.push_back(one->surface.points.row(p));
-      member.number.push_back(at->second);
+  for (Member& member : whole.members) {
+    const Surface& surface = member.voxels->surface;
+    for (Eigen::Index p = 0; p < surface.points.rows(); ++p) {
+      const auto [at, is_new] = numbers.try_emplace(grid_edge(*member.voxels, p), static_cast<int>(points.size()));
+      if (is_new) points.push_back(surface.points.row(p));
+      member.number[p] = at->second;
     }
-    for (const auto& t : one->surface.triangles.rowwise())
+    for (const auto& t : surface.triangles.rowwise())
       triangles.push_back({member.number[t(0)], member.number[t(1)], member.number[t(2)]});
-    whole.members.push_back(std::move(member));
   }
   whole.staircase.points.resize(static_cast<Eigen::Index>(points.size()), 3);
   for (std::size_t p = 0; p < points.size(); ++p) whole.staircase.points.row(static_cast<Eigen::Index>(p)) = points[p];
-  if (voxels.size() == 1) {
-    whole.staircase.triangles = voxels[0]->surface.triangles;
-    whole.staircase.region = voxels[0]->surface.region;
-  } else {
-    whole.staircase.triangles = once_each(triangles);
-  }
+  whole.staircase.triangles = once_each(triangles);
   return whole;
 }
 
@@ -166,21 +175,27 @@ void restore_volumes(double bound_mm, Whole& whole, Points& points) {
   }
 }
 
-/// Marks the points of triangles that cross one another within a surface. @return how many pairs there are
-std::size_t mark_crossings(const Whole& whole, std::vector<char>& hit) {
-  std::size_t count = 0;
-  for (const Member& member : whole.members) {
-    const auto crossings = self_intersections(member.surface);
-    count += crossings.size();
-    for (const auto& [a, b] : crossings)
-      for (int c = 0; c < 3; ++c)
-        hit[member.number[member.surface.triangles(a, c)]] = hit[member.number[member.surface.triangles(b, c)]] = 1;
+/// Marks the points of triangles that cross one another within a surface, and of components turned inside out, as bits
+/// of a few voxels may be. @return how many pairs and components there are
+std::size_t mark_faults(const Member& member, std::vector<char>& hit) {
+  const auto mark = [&](Eigen::Index triangle) {
+    for (int c = 0; c < 3; ++c) hit[member.number[member.surface.triangles(triangle, c)]] = 1;
+  };
+  const auto crossings = self_intersections(member.surface);
+  for (const auto& [a, b] : crossings) {
+    mark(a);
+    mark(b);
   }
-  return count;
+  const std::vector<double> volumes = component_volumes(member.surface, member.component);
+  std::vector<char> turned(volumes.size());
+  for (std::size_t n = 0; n < volumes.size(); ++n) turned[n] = volumes[n] * member.staircase_volumes[n] < 0;
+  for (std::size_t t = 0; t < member.component.size(); ++t)
+    if (turned[member.component[t]]) mark(static_cast<Eigen::Index>(t));
+  return crossings.size() + static_cast<std::size_t>(std::count(turned.begin(), turned.end(), 1));
 }
 
-// Halves the displacement from the staircase around crossings until there are none. @return share left per point
-Eigen::VectorXd remove_crossings(Whole& whole, const Points& points) {
+// Halves the displacement from the staircase around faults until there are none. @return share left per point
+Eigen::VectorXd remove_faults(Whole& whole, const Points& points) {
   const Points displacement = points - whole.staircase.points;
   const auto neighbours = point_neighbours(mesh_edges(whole.staircase.triangles), points.rows());
   Eigen::VectorXd share = Eigen::VectorXd::Ones(points.rows());
@@ -188,13 +203,14 @@ Eigen::VectorXd remove_crossings(Whole& whole, const Points& points) {
   constexpr int most_rounds = 40;
   for (int round = 0;; ++round) {
     std::vector<char> hit(static_cast<std::size_t>(points.rows()), 0);
-    const std::size_t crossings = mark_crossings(whole, hit);
-    if (crossings == 0) return share;
+    std::size_t faults = 0;
+    for (const Member& member : whole.members) faults += mark_faults(member, hit);
+    if (faults == 0) return share;
     if (round == most_rounds)
       throw NumericalFailure(
-          fmt::format("the smoothed surface crosses itself in {} places and could not be repaired; give a "
-                      "smaller --smooth-mm",
-                      crossings));
+          fmt::format("the smoothed surface crosses itself or is turned inside out in {} places and could not be "
+                      "repaired; give a smaller --smooth-mm",
+                      faults));
     const std::vector<char> core = hit;
     for (std::size_t p = 0; p < core.size(); ++p)
       if (core[p])
@@ -236,7 +252,7 @@ std::vector<ShapedSurface> shape_together(const std::vector<const VoxelSurface*>
   fairing.length_mm = options.length_mm;
   Points points = fair(whole.staircase, fairing);
   restore_volumes(largest_offset_voxels * options.spacing_mm.minCoeff(), whole, points);
-  const Eigen::VectorXd share = remove_crossings(whole, points);
+  const Eigen::VectorXd share = remove_faults(whole, points);
   std::vector<ShapedSurface> result;
   for (Member& member : whole.members) {
     Eigen::Index less_smooth = 0;

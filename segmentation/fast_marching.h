@@ -31,8 +31,7 @@ struct FastMarchingOptions {
 /// @param speed  mm per unit of time, finite and >= 0; a front does not enter voxels of speed 0
 /// @return time per voxel; infinity where the front did not come before stop_time
 /// @throws InputError  options out of range; more than about 4e9 voxels; no source; a source outside the image (in mm,
-/// with the image's box) or where
-///   the speed is 0 (in mm); a negative or not finite speed (voxel)
+///   with the image's box) or where the speed is 0 (in mm); a negative or not finite speed (voxel)
 Image<float> fast_march(const Image<float>& speed, std::span<const FrontSource> sources,
                         const FastMarchingOptions& options);
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "segmentation/front_queue.h"
 
-#include <algorithm>
 #include <array>
 #include <functional>
 

@@ -96,7 +96,7 @@ class CompareTool : public Tool {
       draw_distances(run.output(skin_file),
                      fmt::format("{}, {}: RMS {:.2f} mm, mean {:.2f} mm", inputs.measured.name, inputs.pose.name,
                                  comparison.scan.rms_mm, comparison.scan.mae_mm),
-                     run.output(png_));
+                     inputs.measured.side, run.output(png_));
     say(run, inputs.pose, comparison, landmarks);
     doubt(run, scan_name, comparison);
     return Outcome::done;

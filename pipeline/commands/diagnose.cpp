@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "common/error.h"
 #include "pipeline/diagnosis_report.h"
 #include "pipeline/ladder_report.h"
@@ -44,6 +46,10 @@ class DiagnoseTool : public Tool {
         ->capture_default_str();
     app.add_option("--segmentation-mm", options_.tolerances.segmentation_mm,
                    "how well the imaged skin's place is known, 1 sigma")
+        ->check(CLI::NonNegativeNumber)
+        ->capture_default_str();
+    app.add_option("--chest-wall-mm", options_.tolerances.chest_wall_mm,
+                   "how far breath may move the muscle between two scans, 1 sigma")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
     app.add_flag("--ladder", ladder_,
@@ -111,8 +117,10 @@ class DiagnoseTool : public Tool {
     const auto& figures = run.figures(folder() / "diagnosis.vtp");
     std::string verdict = figures.at("verdict");
     for (const auto& effect : figures.at("missing")) verdict += " " + effect.get<std::string>();
+    std::replace(verdict.begin(), verdict.end(), '_', ' ');
     draw_distances(run.output(folder() / ("error_map_" + pose + ".vtp")),
-                   fmt::format("{}, {}: {}", measured.description.name, pose, verdict), run.output(png_));
+                   fmt::format("{}, {}: {}", measured.description.name, pose, verdict), measured.description.side,
+                   run.output(png_));
   }
 
   /// The model it ends with, and that of every rung in a folder of its own, where its shapes find room.

@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include "common/error.h"
@@ -29,6 +30,7 @@ namespace supine::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
+constexpr double panes_share = 0.86;  // of the width; the legend has the rest
 constexpr Colour grey = {0.72, 0.72, 0.72};
 
 vtkSmartPointer<vtkPolyData> read_skin(const fs::path& file) {
@@ -166,31 +168,53 @@ void add_skin(vtkRenderer& pane, vtkPolyData* skin, vtkColorTransferFunction* co
   pane.AddActor(actor);
 }
 
+/// From the front and from the outer side; with two breasts from the outer side of each.
+std::vector<const View*> views_of(const std::string& side) {
+  if (side == "both") return {&from_right, &front, &from_left};
+  return {&front, side == "right" ? &from_right : &from_left};
+}
+
+/// Widths of the panes: as the body's in each view, so that it has one size in all; none less than half of another.
+std::vector<double> shares_of(const std::vector<const View*>& views, const double bounds[6]) {
+  const double wide = bounds[1] - bounds[0], deep = bounds[3] - bounds[2];
+  std::vector<double> shares;
+  for (const View* view : views)
+    shares.push_back(view == &front ? std::max(wide, 0.5 * deep) : std::max(deep, 0.5 * wide));
+  const double sum = std::accumulate(shares.begin(), shares.end(), 0.0);
+  for (double& share : shares) share *= panes_share / sum;
+  return shares;
+}
+
+/// The view that a mark faces; the first of equals.
+const View* best_view(const Mark& mark, const std::vector<const View*>& views) {
+  return *std::max_element(views.begin(), views.end(), [&mark](const View* a, const View* b) {
+    return mark.normal.dot(a->from) < mark.normal.dot(b->from);
+  });
+}
+
 }  // namespace
 
-void draw_distances(const fs::path& file, const std::string& title, const fs::path& png) {
+void draw_distances(const fs::path& file, const std::string& title, const std::string& side, const fs::path& png) {
   const auto skin = read_skin(file);
   blank_uncovered(*skin);
   const auto colours = diverging(colour_range_mm(sizes_of(*skin)));
   const auto marks = hot_spots(*skin);
+  const std::vector<const View*> views = views_of(side);
   double bounds[6];
   skin->GetBounds(bounds);
-  double lateral = 0;  // the side the skin looks to, left or right
-  for (const Mark& mark : marks) lateral += mark.normal.x();
-  const View& aside = lateral < 0 ? from_right : from_left;
+  const std::vector<double> shares = shares_of(views, bounds);
   Sheet sheet(title);
-  const std::pair<const View*, std::pair<double, double>> places[] = {{&front, {0, 0.43}}, {&aside, {0.43, 0.86}}};
-  for (const auto& [view, across] : places) {
-    vtkRenderer& pane = sheet.pane(across.first, 0, across.second, 0.93);
+  double from = 0;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    vtkRenderer& pane = sheet.pane(from, 0, from + shares[v], 0.93);
+    from += shares[v];
     add_skin(pane, skin, colours);
-    for (const Mark& mark : marks) {
-      const bool here = (view == &front) == (-mark.normal.y() >= mark.normal.dot(aside.from));
-      if (here) draw_mark(pane, mark, *view);
-    }
-    look(pane, *view, bounds);
+    for (const Mark& mark : marks)
+      if (best_view(mark, views) == views[v]) draw_mark(pane, mark, *views[v]);
+    look(pane, *views[v], bounds);
     scale_line(pane);
   }
-  draw_legend(sheet.pane(0.86, 0, 1, 0.93), colours);
+  draw_legend(sheet.pane(panes_share, 0, 1, 0.93), colours);
   sheet.write(png);
 }
 

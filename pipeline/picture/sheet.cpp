@@ -133,8 +133,8 @@ void look(vtkRenderer& pane, const View& view, const double bounds[6]) {
 void scale_line(vtkRenderer& pane) {
   const int* size = pane.GetSize();
   const double pixels = 50 * size[1] / (2 * pane.GetActiveCamera()->GetParallelScale());
-  fill(pane, {{30, 30, 30 + pixels, 33}}, ink);
-  write_text(pane, "50 mm", (30 + 0.5 * pixels) / size[0], 40.0 / size[1], {.size = text_size - 3, .up = Up::bottom});
+  fill(pane, {{30, 38, 30 + pixels, 41}}, ink);  // above the view's name
+  write_text(pane, "50 mm", (30 + 0.5 * pixels) / size[0], 48.0 / size[1], {.size = text_size - 3, .up = Up::bottom});
 }
 
 }  // namespace supine::pipeline

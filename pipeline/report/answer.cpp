@@ -85,9 +85,16 @@ void tell_missing(const Json& diagnosis, const Places& places, Answer& answer) {
   const std::string effect = diagnosis["missing"][0];
   const Json* found = candidate(diagnosis, effect);
   answer.sentence = fmt::format("The model lacks {}", words(effect));
-  if (found != nullptr && std::isfinite(number(*found, "held_out_rms_mm")))
-    answer.sentence += fmt::format(": with it, skin that was not fitted is predicted to {:.2f} mm instead of {:.2f}",
-                                   number(*found, "held_out_rms_mm"), number(diagnosis, "base_held_out_rms_mm"));
+  const double with = found != nullptr ? number(*found, "held_out_rms_mm") : std::nan("");
+  const double without = number(diagnosis, "base_held_out_rms_mm");
+  if (with < without)
+    answer.sentence +=
+        fmt::format(": with it, skin that was not fitted is predicted to {:.2f} mm instead of {:.2f}", with, without);
+  else if (std::isfinite(with))
+    answer.sentence += fmt::format(
+        ", but skin that was not fitted is predicted no better with it: {:.2f} mm, {:.2f} "
+        "without",
+        with, without);
   answer.sentence += ".";
   answer.next = fmt::format("Add {} to the model and calibrate again.", words(effect));
   answer.command = fmt::format("build/bin/supine-model add {} {}/model.toml && {}", effect, places.case_name,

@@ -209,6 +209,14 @@ TEST(ReportAnswer, NamesWhatIsMissingAndTheNextCommand) {
   EXPECT_EQ(answer.error["rms_mm"], 1.03);
 }
 
+TEST(ReportAnswer, SaysWhenSkinThatWasNotFittedGainsNothing) {
+  const Answer answer = answered({{"verdict", "missing"},
+                                  {"missing", {"skin_prestretch"}},
+                                  {"base_held_out_rms_mm", 1.49},
+                                  {"candidates", {{{"effect", "skin_prestretch"}, {"held_out_rms_mm", 1.52}}}}});
+  expect_words(answer.sentence, {"The model lacks skin prestretch, but", "no better", "1.52 mm, 1.49 without"});
+}
+
 TEST(ReportAnswer, SaysWhenNothingIsMissing) {
   const Answer answer = answered({{"verdict", "nothing_missing"}, {"missing", Json::array()}, {"why", "it fits"}});
   EXPECT_EQ(answer.sentence, "Nothing is missing: it fits.");

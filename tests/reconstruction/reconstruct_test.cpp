@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "reconstruction/mesh_edges.h"
 #include "tests/reconstruction/volumes.h"
@@ -55,6 +57,24 @@ TEST(Reconstruct, DomeOnASlabWithTwoTouchingOrgans) {
   EXPECT_NEAR(area(shape, Region::skin) / (2 * std::numbers::pi * 900), 1, 0.02);
   EXPECT_NEAR(area(shape, Region::inner) / (std::numbers::pi * 900), 1, 0.03);
   EXPECT_EQ(area(shape, Region::cut), 0);
+}
+
+TEST(Reconstruct, TouchingOrgansShareTheirVertices) {
+  const LabelImage image = voxelise(dome_grid(0.75), [](const Eigen::Vector3d& at) {  // the two balls overlap
+    return dome_with_organs(at.x() > 0 ? at + Eigen::Vector3d(3, 0, 0) : at);
+  });
+  const Reconstruction shape = reconstruct(image, {});
+  ASSERT_EQ(shape.organs.size(), 2);
+  for (const OrganSurface& organ : shape.organs) expect_sound(organ);
+  std::set<std::array<double, 3>> gland;
+  for (const auto& p : shape.organs[0].surface.points.rowwise()) gland.insert({p(0), p(1), p(2)});
+  std::size_t common = 0, faces = 0;
+  for (const auto& p : shape.organs[1].surface.points.rowwise()) common += gland.count({p(0), p(1), p(2)});
+  const VoxelSurface tumour = voxel_surface(image, only(Tissue::tumour));
+  for (const auto& v : tumour.outside.rowwise())
+    faces += static_cast<Tissue>(image.at(v(0), v(1), v(2))) == Tissue::gland;
+  EXPECT_GT(faces, 50u);
+  EXPECT_EQ(common, faces);
 }
 
 TEST(Reconstruct, MuscleSheetIsTheInnerFacesTurnedRound) {

@@ -21,7 +21,7 @@
     }
   };
   page.replaceChildren(
-    el("header", { class: "top" }, el("h1", {}, data.case.name), el("p", {}, `Supine report · ${data.case.side} breast`)),
+    el("header", { class: "top" }, el("h1", {}, data.case.name), el("p", {}, `Supine report · ${data.case.side} breast${data.case.side === "both" ? "s" : ""}`)),
     el("nav", { "aria-label": "parts of the report" }, parts.map(([name, title]) => el("a", { href: "#" + name }, title))),
     ...parts.map(([name]) => draw(name)),
     el("footer", {}, `Supine ${data.version}${data.commit ? " (" + data.commit + ")" : ""}. Research software, not a medical device. Lengths in mm, coordinates patient LPS.`));

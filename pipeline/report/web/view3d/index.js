@@ -75,7 +75,7 @@ class View {
     }).node : "";
     this.morph_input = slider("from prone over undeformed to the pose", 100 * this.morph, 0, 200, (v) => this.set_morph(v / 100));
     const stop = (label, at) => el("button", { type: "button", "data-morph": at, onclick: () => this.go(at) }, label);
-    const { show } = this;
+    const { show } = this, both = supine.data.case.side === "both";
     const set = (key) => (value) => { show[key] = value; this.update(); };
     this.panel.replaceChildren(rung.node, pose, group("Shape", this.morph_input, el("div", { class: "stops" }, stop("prone", 0), stop("undeformed", 1), stop(this.pose, 2))),
       choice("Colour of the skin", [{ id: "distance", label: "distance" }, { id: "region", label: "regions" }, { id: "plain", label: "plain" }], this.colour, (id) => { this.colour = id; this.update(); }).node,
@@ -84,7 +84,7 @@ class View {
         picker("measured scan ", [["off", "off"], ["points", "points"], ["surface", "surface"]], show.scan, set("scan")),
         check_box("landmarks (● predicted, ○ measured)", show.landmarks, set("landmarks")), check_box("names of what is off", show.labels, set("labels")),
         check_box("prone shape beside it", show.ghost, set("ghost")), check_box("chest muscle", show.muscle, set("muscle"))),
-      group("Look from", el("div", { class: "row" }, [["front", "front"], ["outer", "outer side"], ["inner", "inner side"], ["feet", "feet"], ["head", "head"]]
+      group("Look from", el("div", { class: "row" }, [["front", "front"], ["outer", both ? "left side" : "outer side"], ["inner", both ? "right side" : "inner side"], ["feet", "feet"], ["head", "head"]]
         .map(([id, label]) => el("button", { type: "button", "data-view": id, onclick: () => this.view(id) }, label)))),
       el("p", { class: "hint" }, "Drag to turn, wheel to zoom. Keys in the picture: arrows, + −, 1 to 5, 0."),
       el("button", { type: "button", onclick: () => this.save() }, "Scan and distances as CSV"));
