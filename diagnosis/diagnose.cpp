@@ -62,7 +62,8 @@ bool is_sure(const Refit& refit, const ScoreTable& table, const BaseFigures& bas
   // A scan that lies elsewhere says nothing of where another one lies.
   const bool poses = refit.effect != "misregistration" && !refit.pose_rms_mm.empty() &&
                      refit.pose_rms_mm.size() == base.pose_rms_mm.size();
-  if (!poses) return true;
+  if (!poses) return refit.bic >= rules.bic;
+  if (refit.bic < rules.pose_bic) return false;
   const double noise = base.noise_mm * base.noise_mm, before = std::pow(pose_rms(base.pose_rms_mm), 2) - noise;
   return std::pow(pose_rms(refit.pose_rms_mm), 2) - noise <= (1 - rules.pose_excess_share) * before;
 }
@@ -73,8 +74,8 @@ std::vector<const Refit*> counting(const ScoreTable& table, const std::vector<Re
                                    const VerdictRules& rules) {
   const auto counts = [&](const Refit& refit) {
     // The model as it is has b = 0: what does not stand out from that either is not named.
-    return refit.finished && refit.bic >= rules.bic &&
-           (improves(refit.held_out_rms_mm, base, rules) || is_sure(refit, table, base, rules));
+    return refit.finished && ((refit.bic >= rules.bic && improves(refit.held_out_rms_mm, base, rules)) ||
+                              is_sure(refit, table, base, rules));
   };
   std::vector<const Refit*> good;
   const Refit* best = nullptr;

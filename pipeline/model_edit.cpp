@@ -76,16 +76,10 @@ std::size_t block_end(const std::vector<std::string>& lines, std::size_t begin) 
   return end;
 }
 
-/// Strength is what changes the model at its typical size; an effect without such a row is all strength.
-bool is_strength(const Effect& effect, const Parameter& row) {
-  const auto& rows = effect.parameters();
-  const bool any = std::any_of(rows.begin(), rows.end(), [](const Parameter& r) { return r.median != r.null; });
-  return !any || row.median != row.null;
-}
-
-std::string parameter_line(const Effect& effect, const Parameter& row) {
+/// Everything free within its range and about its usual value, as the diagnosis refits the effect: a strength found
+/// with another place than the file has would be another strength.
+std::string parameter_line(const Parameter& row) {
   const std::string comment = fmt::format("# {}{}", row.meaning, row.unit == "1" ? "" : ", " + row.unit);
-  if (!is_strength(effect, row)) return fmt::format("{} = {}  {}\n", row.name, row.median, comment);
   const double prior_sd = row.one_sided ? row.median * std::expm1(row.log_sd) : row.log_sd;
   return fmt::format("{} = {{ value = {}, prior_sd = {:.3g}, lower = {}, upper = {} }}  {}\n", row.name, row.median,
                      prior_sd, row.lower, row.upper, comment);
@@ -128,7 +122,7 @@ std::size_t byte_of(const std::string& line, std::size_t column) {
 
 std::string effect_block(const Effect& effect) {
   std::string block = fmt::format("[[effect]]  # {}\nname = \"{}\"\n", effect.meaning(), effect.name());
-  for (const Parameter& row : effect.parameters()) block += parameter_line(effect, row);
+  for (const Parameter& row : effect.parameters()) block += parameter_line(row);
   for (const auto& option : effect.options())
     block += fmt::format("{} = \"{}\"  # {}: {}\n", option.name, option.default_value, listed(option.values),
                          option.meaning);

@@ -87,6 +87,11 @@ TEST(Decide, AnUnfittedPoseHasToConfirmIt) {
   EXPECT_EQ(with_pose(0.96), Verdict::missing);
   EXPECT_EQ(with_pose(0.99), Verdict::unexplained) << "of 1.0 mm 0.51 mm² are above the noise";
   EXPECT_EQ(with_pose(1.1), Verdict::unexplained);
+  const auto weak = [&base](double bic) {
+    return decide(table_with(0.001), {sure_refit(bic, 1.8, {0.9})}, {nothing_left}, base).verdict;
+  };
+  EXPECT_EQ(weak(4), Verdict::missing) << "a pose that was not fitted is proof of another kind";
+  EXPECT_EQ(weak(1), Verdict::unexplained);
 }
 
 TEST(Decide, AScanThatLiesElsewhereIsNotJudgedByAnotherScan) {

@@ -35,6 +35,18 @@ TEST_F(ModelEdit, EveryEffectOfTheCatalogueCanBeAddedReadAndRemoved) {
   }
 }
 
+TEST_F(ModelEdit, StrengthAndPlaceOfAnAddedEffectAreFreeAboutTheirUsualValues) {
+  const simulation::Model model = read_model(file(with_effect(file(base), "ligament")));
+  for (const simulation::Parameter& row : simulation::find_effect("ligament")->parameters()) {
+    const simulation::Setting& setting = model.effects[0].parameters.at(row.name);
+    EXPECT_TRUE(setting.free) << row.name;
+    EXPECT_EQ(setting.value, row.median) << row.name;
+    EXPECT_GT(setting.prior_sd.value(), 0) << row.name;
+    EXPECT_EQ(setting.lower, row.lower) << row.name;
+    EXPECT_EQ(setting.upper, row.upper) << row.name;
+  }
+}
+
 TEST_F(ModelEdit, RemovingKeepsTheCommentOfTheNextTable) {
   const auto path =
       file("[[effect]]\nname = \"ligament\"\nwidth_mm = 10\n\n# about the skin\n[skin]\nthickness_mm = 2\n");

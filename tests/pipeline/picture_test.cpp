@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // --png of the tools, without a display.
+#include "pipeline/picture.h"
+
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -68,6 +70,19 @@ TEST_F(Pictures, APictureOfAnotherNameHasItsOwnSidecar) {
   const auto sidecar = nlohmann::json::parse(read_text(folder_ / "map.json"));
   EXPECT_EQ(sidecar["drawn_from"], "comparison.vtp");
   EXPECT_EQ(sidecar["provenance"]["tool"], "supine-compare");
+}
+
+TEST_F(Pictures, TheOuterSideIsThatOfTheBreastAndOfBothBreasts) {
+  NEEDS_XVFB();
+  std::vector<std::string> drawn;
+  for (const std::string side : {"left", "right", "both"}) {
+    draw_distances(small_run() / "out/comparison.vtp", "the same title", side, folder_ / (side + ".png"));
+    expect_picture(side + ".png");
+    drawn.push_back(read_text(folder_ / (side + ".png")));
+  }
+  EXPECT_NE(drawn[0], drawn[1]);
+  EXPECT_NE(drawn[0], drawn[2]);
+  EXPECT_NE(drawn[1], drawn[2]);
 }
 
 TEST_F(Pictures, TetrahedraliseDrawsItsRegions) {
