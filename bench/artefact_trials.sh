@@ -24,10 +24,10 @@ for case in "$@"; do
       make --no-print-directory -f "$here/../pipeline/Makefile" BIN="$bin" CASE="$copy" TRIANGLES=$triangles MAX_DISTANCE_MM=2 \
         THREADS="${THREADS:-0}" calibrate diagnose >"$copy/log" 2>&1 || { echo "$name $trial failed: $(tail -1 "$copy/log")"; continue; }
     fi
-    jq -r --arg name "$name" --arg trial "$trial" '[$name, $trial, .verdict, (.missing | join(" or ")),
+    jq -r --arg name "$name" --arg trial "$trial" '[$name, $trial, .verdict, (.missing | join(" or ") | if . == "" then "-" else . end),
         ([.candidates[].p_value] | min), (.base_held_out_rms_mm * 100 | round / 100), (.candidates | max_by(.bic) | .effect)] | @tsv' \
       "$copy/out/diagnosis.json" | while IFS=$'\t' read -r n t v m p h b; do
-      printf '%-18s %-16s %-16s %-34s %7s %9s %s\n' "$n" "$t" "$v" "${m:--}" "$p" "$h" "$b"
+      printf '%-18s %-16s %-16s %-34s %7s %9s %s\n' "$n" "$t" "$v" "$m" "$p" "$h" "$b"
     done
   done
 done

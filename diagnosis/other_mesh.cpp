@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/other_mesh.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -120,11 +121,11 @@ TetMesh other_mesh(const TetMesh& mesh, const meshing::Anatomy& anatomy, double 
 }
 
 TetMesh coarser_mesh(const TetMesh& mesh, const meshing::Anatomy& anatomy, double triangle_share) {
-  constexpr double farthest_mm = 1.5;
+  constexpr double farthest_mm = 1.5, edge_share = 0.2;  // a bound far under the edge would call for a finer mesh
   const reconstruction::Surface surface = boundary_of(mesh);
   meshing::DecimateOptions options;
   options.target_triangles = static_cast<int>(triangle_share * static_cast<double>(surface.triangles.rows()));
-  options.max_distance_mm = farthest_mm;
+  options.max_distance_mm = std::max(farthest_mm, edge_share * meshing::mean_edge_mm(surface));
   options.method = meshing::DecimateMethod::triangles;
   const reconstruction::Surface coarse = meshing::decimate(surface, options).surface;
   return filled(coarse, meshing::mean_edge_mm(coarse), mesh, anatomy);
