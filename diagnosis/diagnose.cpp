@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "diagnosis/chi_squared.h"
 #include "simulation/parameters.h"
@@ -56,16 +57,30 @@ double p_of(const ScoreTable& table) {
   return p;
 }
 
+/// Share of what unfitted poses have above the noise that the refit takes away, in squares; none without such a pose. A
+/// scan that lies elsewhere says nothing of where another one lies.
+std::optional<double> pose_fall(const Refit& refit, const BaseFigures& base) {
+  if (refit.effect == "misregistration" || refit.pose_rms_mm.empty() ||
+      refit.pose_rms_mm.size() != base.pose_rms_mm.size())
+    return {};
+  const double noise = base.noise_mm * base.noise_mm, before = std::pow(pose_rms(base.pose_rms_mm), 2) - noise;
+  const double after = std::pow(pose_rms(refit.pose_rms_mm), 2) - noise;
+  return (before - after) / std::max(before, 0.01 * noise);
+}
+
 /// Whether the p of the effect is proof enough: held-out blocks of skin cannot show what lies under one block alone.
 bool is_sure(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
   if (p_of_effect(table, refit.effect) > rules.sure_p || !leaves_out_null(refit)) return false;
-  // A scan that lies elsewhere says nothing of where another one lies.
-  const bool poses = refit.effect != "misregistration" && !refit.pose_rms_mm.empty() &&
-                     refit.pose_rms_mm.size() == base.pose_rms_mm.size();
-  if (!poses) return refit.bic >= rules.bic;
-  if (refit.bic < rules.pose_bic) return false;
-  const double noise = base.noise_mm * base.noise_mm, before = std::pow(pose_rms(base.pose_rms_mm), 2) - noise;
-  return std::pow(pose_rms(refit.pose_rms_mm), 2) - noise <= (1 - rules.pose_excess_share) * before;
+  const std::optional<double> fall = pose_fall(refit, base);
+  if (!fall) return refit.bic >= rules.bic;
+  return refit.bic >= rules.pose_bic &&
+         *fall >= (refit.bic >= rules.strong_bic ? rules.strong_pose_excess_share : rules.pose_excess_share);
+}
+
+/// Whether skin that was not fitted shows it: blocks of the fitted scan fall, and no other pose rises.
+bool is_confirmed(const Refit& refit, const BaseFigures& base, const VerdictRules& rules) {
+  return refit.bic >= rules.bic && improves(refit.held_out_rms_mm, base, rules) &&
+         pose_fall(refit, base).value_or(0) >= -rules.pose_excess_share;
 }
 
 /// What counts, best first, and what comes near the best of it whether it would count by itself or not.
@@ -74,8 +89,7 @@ std::vector<const Refit*> counting(const ScoreTable& table, const std::vector<Re
                                    const VerdictRules& rules) {
   const auto counts = [&](const Refit& refit) {
     // The model as it is has b = 0: what does not stand out from that either is not named.
-    return refit.finished && ((refit.bic >= rules.bic && improves(refit.held_out_rms_mm, base, rules)) ||
-                              is_sure(refit, table, base, rules));
+    return refit.finished && (is_confirmed(refit, base, rules) || is_sure(refit, table, base, rules));
   };
   std::vector<const Refit*> good;
   const Refit* best = nullptr;
@@ -161,7 +175,8 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
     result.why = "no effect of the catalogue lowers the held-out error";
     if (!refits.empty() && refits.front().finished && refits.front().bic > rules.bic)
       result.why += fmt::format("; {} fits best (p {:.3f}) but is not confirmed", refits.front().effect, p);
-    if (!real(base.left)) return result;
+    const bool strong = !refits.empty() && refits.front().finished && refits.front().bic >= rules.strong_bic;
+    if (!real(base.left) && !(strong && p < rules.p_value)) return result;
     result.verdict = Verdict::unexplained;
     if (!refits.empty()) result.missing = {refits.front().effect};
     return result;

@@ -26,9 +26,11 @@ struct VerdictRules {
   double pose_excess_share = 0.1;  ///< if poses that were not fitted lose this share of what they have above the noise
   double bic = 6;                  ///< candidates within this of the best cannot be told from it, times the misfit left
   double pose_share = 0.05;        ///< and neither can those that predict a held-out pose better, or within this share
-  double pose_bic = 2;             ///< enough then: positive evidence of its own
-  double lack_of_fit_p = 0.01;     ///< what is left after the best is more than errors
-  double lack_of_fit_misfit = 1.6;  ///< and this many times what errors would leave on the mean
+  double strong_bic = 20;          ///< b that something real is behind, whatever it is
+  double strong_pose_excess_share = 0.03;  ///< enough of a fall then
+  double pose_bic = 2;                     ///< enough then: positive evidence of its own
+  double lack_of_fit_p = 0.01;             ///< what is left after the best is more than errors
+  double lack_of_fit_misfit = 1.6;         ///< and this many times what errors would leave on the mean
 };
 
 /// What is left of a model after its fit.
@@ -54,12 +56,15 @@ struct Diagnosis {
 };
 
 /// nothing_missing  no score that chance would not give (p), or nothing that lowers the held-out error
-/// missing          one refit counts and no other comes near. A refit counts that beats its penalty by `bic` and
-///                  lowers the held-out error. Blocks of skin that are predicted without themselves cannot show what
-///                  lies under one of them alone, so instead its own p may be below sure_p and its interval leave out
-///                  its null: then a pose that was not fitted has to confirm it, where there is one
+/// missing          one refit counts and no other comes near. A refit counts that beats its penalty by `bic`,
+///                  lowers the held-out error and spoils no pose that was not fitted. Blocks of skin that are predicted
+///                  without themselves cannot show what lies under one of them alone, so instead its own p may be below
+///                  sure_p and its interval leave out its null: then a pose that was not fitted has to confirm it,
+///                  where there is one
 /// ambiguous        several do, measurement effects first
-/// unexplained      the residual is real, and either nothing lowers the held-out error or the best leaves much of it
+/// unexplained      the residual is real, or the best candidate beats its penalty by `strong_bic`, and nothing counts;
+/// or
+///                  the best leaves much of a real residual
 /// @param refits  best first; of them only finished ones count
 /// @param left    lack of fit of each refit
 Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, const std::vector<LackOfFit>& left,

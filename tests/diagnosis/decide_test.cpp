@@ -57,9 +57,12 @@ TEST(Decide, DoesNotNameWhatTheHeldOutErrorDoesNotConfirm) {
   const Diagnosis d = verdict({refit("ligament", 60, 1.39)});
   EXPECT_EQ(d.verdict, Verdict::unexplained);
   EXPECT_EQ(d.missing, Names{"ligament"});
-  const auto quiet =
-      decide(table_with(0.001), {refit("ligament", 60, 1.39)}, {nothing_left}, base_figures(nothing_left));
-  EXPECT_EQ(quiet.verdict, Verdict::nothing_missing);
+  const auto unconfirmed = [](double bic) {
+    return decide(table_with(0.001), {refit("ligament", bic, 1.39)}, {nothing_left}, base_figures(nothing_left))
+        .verdict;
+  };
+  EXPECT_EQ(unconfirmed(15), Verdict::nothing_missing);
+  EXPECT_EQ(unconfirmed(60), Verdict::unexplained) << "something is there";
 }
 
 /// A refit whose interval leaves out the null.
@@ -81,17 +84,29 @@ TEST(Decide, ALowPNamesWhatLiesUnderOneBlockOfSkinAlone) {
 TEST(Decide, AnUnfittedPoseHasToConfirmIt) {
   BaseFigures base = base_figures(real_left);
   base.pose_rms_mm = {1.0};
-  const auto with_pose = [&base](double pose) {
-    return decide(table_with(0.001), {sure_refit(60, 1.8, {pose})}, {nothing_left}, base).verdict;
+  const auto with_pose = [&base](double pose, double bic = 15) {
+    return decide(table_with(0.001), {sure_refit(bic, 1.8, {pose})}, {nothing_left}, base).verdict;
   };
   EXPECT_EQ(with_pose(0.96), Verdict::missing);
   EXPECT_EQ(with_pose(0.99), Verdict::unexplained) << "of 1.0 mm 0.51 mm² are above the noise";
   EXPECT_EQ(with_pose(1.1), Verdict::unexplained);
+  EXPECT_EQ(with_pose(0.99, 60), Verdict::missing);
+  EXPECT_EQ(with_pose(1.01, 60), Verdict::unexplained);
   const auto weak = [&base](double bic) {
     return decide(table_with(0.001), {sure_refit(bic, 1.8, {0.9})}, {nothing_left}, base).verdict;
   };
   EXPECT_EQ(weak(4), Verdict::missing) << "a pose that was not fitted is proof of another kind";
   EXPECT_EQ(weak(1), Verdict::unexplained);
+}
+
+TEST(Decide, BlocksOfSkinAreNotBelievedWhereAnotherPoseGetsWorse) {
+  BaseFigures base = base_figures(nothing_left);
+  base.pose_rms_mm = {0.87};
+  const auto with_pose = [&base](double pose) {
+    return decide(table_with(0.001), {refit("ligament", 15, 1.1, {pose})}, {nothing_left}, base).verdict;
+  };
+  EXPECT_EQ(with_pose(0.87), Verdict::missing);
+  EXPECT_EQ(with_pose(0.94), Verdict::nothing_missing);
 }
 
 TEST(Decide, AScanThatLiesElsewhereIsNotJudgedByAnotherScan) {
