@@ -9,7 +9,6 @@
 #include <optional>
 
 #include "diagnosis/chi_squared.h"
-#include "simulation/parameters.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -43,14 +42,6 @@ double p_of_effect(const ScoreTable& table, const std::string& effect) {
   return 1;
 }
 
-/// Whether the interval of some parameter leaves out its null.
-bool leaves_out_null(const Refit& refit) {
-  return std::any_of(refit.parameters.begin(), refit.parameters.end(), [](const FittedParameter& p) {
-    const simulation::Parameter* row = simulation::find_parameter(p.name);
-    return row != nullptr && (p.low > row->null || p.high < row->null);
-  });
-}
-
 double p_of(const ScoreTable& table) {
   double p = 1;
   for (const Score& score : table.scores) p = std::min(p, score.p_value);
@@ -70,7 +61,7 @@ std::optional<double> pose_fall(const Refit& refit, const BaseFigures& base) {
 
 /// Whether the p of the effect is proof enough: held-out blocks of skin cannot show what lies under one block alone.
 bool is_sure(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
-  if (p_of_effect(table, refit.effect) > rules.sure_p || !leaves_out_null(refit)) return false;
+  if (p_of_effect(table, refit.effect) > rules.sure_p) return false;
   const std::optional<double> fall = pose_fall(refit, base);
   if (!fall) return refit.bic >= rules.bic;
   return refit.bic >= rules.pose_bic &&

@@ -59,8 +59,7 @@ struct Diagnosis {
 /// missing          one refit counts and no other comes near. A refit counts that beats its penalty by `bic`,
 ///                  lowers the held-out error and spoils no pose that was not fitted. Blocks of skin that are predicted
 ///                  without themselves cannot show what lies under one of them alone, so instead its own p may be below
-///                  sure_p and its interval leave out its null: then a pose that was not fitted has to confirm it,
-///                  where there is one
+///                  sure_p: then a pose that was not fitted has to confirm it, where there is one
 /// ambiguous        several do, measurement effects first
 /// unexplained      the residual is real, or the best candidate beats its penalty by `strong_bic`, and nothing counts;
 /// or

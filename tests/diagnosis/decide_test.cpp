@@ -54,38 +54,28 @@ TEST(Decide, AHeldOutPoseTellsApartAndBringsBack) {
 }
 
 TEST(Decide, DoesNotNameWhatTheHeldOutErrorDoesNotConfirm) {
-  const Diagnosis d = verdict({refit("ligament", 60, 1.39)});
+  constexpr double p = 0.03;  // not low enough to name anything by itself
+  const Diagnosis d = verdict({refit("ligament", 60, 1.39)}, nothing_left, p);
   EXPECT_EQ(d.verdict, Verdict::unexplained);
   EXPECT_EQ(d.missing, Names{"ligament"});
   const auto unconfirmed = [](double bic) {
-    return decide(table_with(0.001), {refit("ligament", bic, 1.39)}, {nothing_left}, base_figures(nothing_left))
-        .verdict;
+    return decide(table_with(p), {refit("ligament", bic, 1.39)}, {nothing_left}, base_figures(nothing_left)).verdict;
   };
   EXPECT_EQ(unconfirmed(15), Verdict::nothing_missing);
   EXPECT_EQ(unconfirmed(60), Verdict::unexplained) << "something is there";
 }
 
-/// A refit whose interval leaves out the null.
-Refit sure_refit(double bic, double held_out, std::vector<double> poses = {}) {
-  Refit r = refit("ligament", bic, held_out, std::move(poses));
-  r.parameters = {{"ligament.stiffness_kpa_per_mm", "kPa/mm", 0.4, 0.2, 0.7}};
-  return r;
-}
-
 TEST(Decide, ALowPNamesWhatLiesUnderOneBlockOfSkinAlone) {
-  EXPECT_EQ(verdict({sure_refit(60, 1.8)}).verdict, Verdict::missing);
-  EXPECT_EQ(verdict({sure_refit(60, 1.8)}, nothing_left, 0.03).verdict, Verdict::unexplained) << "p";
-  EXPECT_EQ(verdict({sure_refit(4, 1.8)}).verdict, Verdict::unexplained) << "BIC";
-  Refit open = sure_refit(60, 1.8);
-  open.parameters[0].low = 0;
-  EXPECT_EQ(verdict({open}).verdict, Verdict::unexplained) << "interval";
+  EXPECT_EQ(verdict({refit("ligament", 60, 1.8)}).verdict, Verdict::missing);
+  EXPECT_EQ(verdict({refit("ligament", 60, 1.8)}, nothing_left, 0.03).verdict, Verdict::unexplained) << "p";
+  EXPECT_EQ(verdict({refit("ligament", 4, 1.8)}).verdict, Verdict::unexplained) << "BIC";
 }
 
 TEST(Decide, AnUnfittedPoseHasToConfirmIt) {
   BaseFigures base = base_figures(real_left);
   base.pose_rms_mm = {1.0};
   const auto with_pose = [&base](double pose, double bic = 15) {
-    return decide(table_with(0.001), {sure_refit(bic, 1.8, {pose})}, {nothing_left}, base).verdict;
+    return decide(table_with(0.001), {refit("ligament", bic, 1.8, {pose})}, {nothing_left}, base).verdict;
   };
   EXPECT_EQ(with_pose(0.96), Verdict::missing);
   EXPECT_EQ(with_pose(0.99), Verdict::unexplained) << "of 1.0 mm 0.51 mm² are above the noise";
@@ -93,7 +83,7 @@ TEST(Decide, AnUnfittedPoseHasToConfirmIt) {
   EXPECT_EQ(with_pose(0.99, 60), Verdict::missing);
   EXPECT_EQ(with_pose(1.01, 60), Verdict::unexplained);
   const auto weak = [&base](double bic) {
-    return decide(table_with(0.001), {sure_refit(bic, 1.8, {0.9})}, {nothing_left}, base).verdict;
+    return decide(table_with(0.001), {refit("ligament", bic, 1.8, {0.9})}, {nothing_left}, base).verdict;
   };
   EXPECT_EQ(weak(4), Verdict::missing) << "a pose that was not fitted is proof of another kind";
   EXPECT_EQ(weak(1), Verdict::unexplained);
@@ -112,15 +102,14 @@ TEST(Decide, BlocksOfSkinAreNotBelievedWhereAnotherPoseGetsWorse) {
 TEST(Decide, AScanThatLiesElsewhereIsNotJudgedByAnotherScan) {
   BaseFigures base = base_figures(real_left);
   base.pose_rms_mm = {1.0};
-  Refit shifted = refit("misregistration", 60, 1.8, {1.3});
-  shifted.parameters = {{"misregistration.shift_x_mm", "mm", 3, 2, 4}};
+  const Refit shifted = refit("misregistration", 60, 1.8, {1.3});
   ScoreTable table = table_with(0.001);
   table.scores[0].effect = "misregistration";
   EXPECT_EQ(decide(table, {shifted}, {nothing_left}, base).verdict, Verdict::missing);
 }
 
 TEST(Decide, WhatComesNearIsARivalWhetherItCountsOrNot) {
-  const Diagnosis d = verdict({sure_refit(20, 1.39), refit("segmentation_offset", 16, 1.39)});
+  const Diagnosis d = verdict({refit("ligament", 20, 1.39), refit("segmentation_offset", 16, 1.39)});
   EXPECT_EQ(d.verdict, Verdict::ambiguous);
   EXPECT_EQ(d.missing, (Names{"segmentation_offset", "ligament"}));
 }
