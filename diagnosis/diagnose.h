@@ -18,19 +18,21 @@ bool is_measurement_effect(const std::string& effect);
 
 /// Bounds of the verdict (docs/diagnosis.md).
 struct VerdictRules {
-  double p_value = 0.05;           ///< of the best candidate, over the whole catalogue
-  double held_out_share = 0.05;    ///< the held-out RMS must fall by this share
-  double held_out_mm = 0.05;       ///< and by this much
-  double excess_share = 0.3;       ///< or by this share of what it has above the noise, in squares
+  double p_value = 0.05;         ///< of the best candidate, over the whole catalogue
+  double held_out_share = 0.05;  ///< the held-out RMS must fall by this share
+  double held_out_mm = 0.05;     ///< and by this much
+  double excess_share = 0.3;     ///< or by this share of what it has above the noise, in squares
+  double bic = 6;  ///< least b of what is named; candidates within this of the best cannot be told from it, times the
+                   ///< misfit left
   double sure_p = 0.01;            ///< of an effect that counts by itself, whatever the held-out blocks show
-  double pose_excess_share = 0.1;  ///< if poses that were not fitted lose this share of what they have above the noise
-  double bic = 6;                  ///< candidates within this of the best cannot be told from it, times the misfit left
-  double pose_share = 0.05;        ///< and neither can those that predict a held-out pose better, or within this share
+  double pose_bic = 2;             ///< b that is enough with sure_p where an unfitted pose confirms it
+  double pose_excess_share = 0.1;  ///< that pose must lose this share of what it has above the noise, in squares; as
+                                   ///< large a rise denies what blocks of skin show
   double strong_bic = 20;          ///< b that something real is behind, whatever it is
-  double strong_pose_excess_share = 0.03;  ///< enough of a fall then
-  double pose_bic = 2;                     ///< enough then: positive evidence of its own
-  double lack_of_fit_p = 0.01;             ///< what is left after the best is more than errors
-  double lack_of_fit_misfit = 1.6;         ///< and this many times what errors would leave on the mean
+  double strong_pose_excess_share = 0.03;  ///< enough of a fall from that b on
+  double pose_share = 0.05;         ///< rivals too: those that predict an unfitted pose better, or within this share
+  double lack_of_fit_p = 0.01;      ///< what is left after the best is more than errors
+  double lack_of_fit_misfit = 1.6;  ///< and this many times what errors would leave on the mean
 };
 
 /// What is left of a model after its fit.
@@ -61,9 +63,8 @@ struct Diagnosis {
 ///                  without themselves cannot show what lies under one of them alone, so instead its own p may be below
 ///                  sure_p: then a pose that was not fitted has to confirm it, where there is one
 /// ambiguous        several do, measurement effects first
-/// unexplained      the residual is real, or the best candidate beats its penalty by `strong_bic`, and nothing counts;
-/// or
-///                  the best leaves much of a real residual
+/// unexplained      nothing counts, though the residual is real or the best b is at least `strong_bic`; or the best
+///                  leaves much of a real residual
 /// @param refits  best first; of them only finished ones count
 /// @param left    lack of fit of each refit
 Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, const std::vector<LackOfFit>& left,

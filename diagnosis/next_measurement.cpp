@@ -92,8 +92,8 @@ class Pose {
     Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(n, n);
     const Tolerances tolerances;
     for (const auto& row : simulation::find_effect("misregistration")->parameters()) {
-      const double tolerance = row.unit == "rad" ? tolerances.registration_rad : tolerances.registration_mm;
-      const Eigen::VectorXd mode = tolerance * slope("misregistration." + row.name);
+      const Eigen::VectorXd mode =
+          tolerance_for("misregistration", row.unit, tolerances) * slope("misregistration." + row.name);
       sigma.noalias() += mode * mode.transpose();
     }
     for (Eigen::Index i = 0; i < n; ++i)
