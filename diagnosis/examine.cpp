@@ -15,6 +15,7 @@ namespace {
 
 using calibration::FreeParameters;
 
+constexpr double far_from_given = 0.7;  // in coordinates: a factor of 2 in a modulus
 constexpr double least_worth = 3;
 constexpr double worth_share = 0.05;  // of the best score: what is further behind is not refitted
 
@@ -24,38 +25,54 @@ void tell(const ExamineOptions& options, const std::string& what) {
   if (options.progress) options.progress(what);
 }
 
-void measure_mesh(const Subject& subject, const calibration::Fit& fit, const ExamineOptions& options, Findings& found) {
+void measure_mesh(const Subject& subject, const simulation::Model& model, const calibration::Fit& fit,
+                  const ExamineOptions& options, Findings& found) {
   if (!options.other_meshes) {
     found.numerical_failure = "not asked for";
     return;
   }
   tell(options, "two other meshes");
   try {
-    found.numerical = measure_numerical_error(subject.fitted, subject.model, fit);
+    found.numerical = measure_numerical_error(subject.fitted, model, fit);
   } catch (const NumericalFailure& failure) {
     found.numerical_failure = failure.what();
   }
+}
+
+/// What is known of the errors, at coordinates @p u, and the least of F under them from there.
+/// @param near  solution of @p u, or nullptr
+void fit_from(const Subject& subject, calibration::Evaluator& evaluator, const FreeParameters& parameters,
+              const Eigen::VectorXd& u, const simulation::ChainSolution* near, const ExamineOptions& options,
+              Findings& found) {
+  calibration::FitOptions as_given;
+  as_given.noise_mm = subject.noise_mm;
+  as_given.near = near;
+  tell(options, "sensitivities");
+  const calibration::Fit fit = calibration::evaluate_fit(evaluator, parameters, as_given, u);
+  const simulation::Model model = parameters.model(u);
+  const auto errors = calibration::fit_error_model(fit.residuals, fit.linearisation.slope);
+  measure_mesh(subject, model, fit, options, found);
+  found.unseen.clear();
+  const auto candidates = find_candidates(evaluator, model, fit, found.unseen);
+  found.sources = error_sources(fit.residuals, candidates, found.numerical ? &*found.numerical : nullptr, errors,
+                                options.tolerances);
+  found.whitening = Whitening::of(fit.residuals, found.sources);
+  found.metric = {&found.whitening, found.sources.mean_mm, fit.mask, subject.noise_mm};
+  tell(options, "fit under all errors");
+  found.base = weigh(evaluator, parameters, found.metric, u, &fit.prediction.solution);
+  descend(evaluator, parameters, found.metric, DescentOptions{}, found.base);
 }
 
 /// Errors from the model as given; then the base model at the least of F, and the catalogue there.
 void fit_base(const Subject& subject, calibration::Evaluator& evaluator, const ExamineOptions& options,
               Findings& found) {
   const FreeParameters parameters(subject.model);
-  calibration::FitOptions as_given;
-  as_given.noise_mm = subject.noise_mm;
-  as_given.near = subject.near;
-  tell(options, "sensitivities");
-  const calibration::Fit fit = calibration::evaluate_fit(evaluator, parameters, as_given, parameters.start());
-  const auto errors = calibration::fit_error_model(fit.residuals, fit.linearisation.slope);
-  measure_mesh(subject, fit, options, found);
-  const auto candidates = find_candidates(evaluator, subject.model, fit, found.unseen);
-  found.sources = error_sources(fit.residuals, candidates, found.numerical ? &*found.numerical : nullptr, errors,
-                                options.tolerances);
-  found.whitening = Whitening::of(fit.residuals, found.sources);
-  found.metric = {&found.whitening, found.sources.mean_mm, fit.mask, subject.noise_mm};
-  tell(options, "fit under all errors");
-  found.base = weigh(evaluator, parameters, found.metric, parameters.start(), &fit.prediction.solution);
-  descend(evaluator, parameters, found.metric, DescentOptions{}, found.base);
+  fit_from(subject, evaluator, parameters, parameters.start(), subject.near, options, found);
+  // Where something is missing a calibration may end at moduli no body has: errors measured there are not the body's.
+  if ((found.base.fit.u - parameters.start()).cwiseAbs().maxCoeff() > far_from_given) {
+    const calibration::Fit first = std::move(found.base.fit);
+    fit_from(subject, evaluator, parameters, first.u, &first.prediction.solution, options, found);
+  }
   found.model = parameters.model(found.base.fit.u);
   found.free = parameters.names();
   found.unseen.clear();

@@ -35,9 +35,34 @@ Rows rows_of(const calibration::Fit& fit, const FreeParameters& parameters, cons
   return rows;
 }
 
-void evaluate(const Rows& rows, Eigen::Index parameters, WeightedFit& fit) {
-  fit.objective = rows.value.squaredNorm();
-  fit.data = rows.value.head(rows.value.size() - parameters).squaredNorm();
+/// F of a prediction, its slopes not needed.
+void evaluate(const FreeParameters& parameters, const Metric& metric, WeightedFit& result) {
+  const calibration::Fit& fit = result.fit;
+  result.data = metric.whitening->apply(fit.residuals.distance_mm + metric.mean_mm).squaredNorm();
+  result.objective = result.data;
+  for (Eigen::Index j = 0; j < parameters.size(); ++j)
+    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(j)])
+      result.objective += std::pow((fit.u[j] - prior->mean) / prior->sd, 2);
+}
+
+/// F at given coordinates, without its slopes.
+WeightedFit predicted(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
+                      const Eigen::VectorXd& u, const simulation::ChainSolution* near) {
+  WeightedFit result;
+  calibration::Fit& fit = result.fit;
+  fit.u = u;
+  fit.mask = metric.mask;
+  fit.prediction = evaluator.predict(parameters.model(u), near);
+  fit.residuals = calibration::residuals_of(evaluator.scene(), fit.prediction, fit.mask, metric.noise_mm);
+  evaluate(parameters, metric, result);
+  return result;
+}
+
+void add_slopes(Evaluator& evaluator, const FreeParameters& parameters, WeightedFit& result) {
+  calibration::Fit& fit = result.fit;
+  const simulation::Sensitivities sensitivities(evaluator.chain(), parameters.model(fit.u), fit.prediction.solution);
+  fit.linearisation =
+      calibration::linearise(evaluator, sensitivities, parameters, fit.u, fit.prediction, fit.residuals);
 }
 
 /// Coordinates that may move: not those at an end of their range that pull further out.
@@ -72,21 +97,14 @@ Eigen::VectorXd step_of(const FreeParameters& parameters, const Rows& rows, cons
 
 WeightedFit weigh(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
                   const Eigen::VectorXd& u, const simulation::ChainSolution* near) {
-  WeightedFit result;
-  calibration::Fit& fit = result.fit;
-  fit.u = u;
-  fit.mask = metric.mask;
-  fit.prediction = evaluator.predict(parameters.model(u), near);
-  fit.residuals = calibration::residuals_of(evaluator.scene(), fit.prediction, fit.mask, metric.noise_mm);
-  const simulation::Sensitivities sensitivities(evaluator.chain(), parameters.model(u), fit.prediction.solution);
-  fit.linearisation = calibration::linearise(evaluator, sensitivities, parameters, u, fit.prediction, fit.residuals);
-  evaluate(rows_of(fit, parameters, metric), parameters.size(), result);
+  WeightedFit result = predicted(evaluator, parameters, metric, u, near);
+  add_slopes(evaluator, parameters, result);
   result.evaluations = 1;
   return result;
 }
 
 void weigh_again(const FreeParameters& parameters, const Metric& metric, WeightedFit& fit) {
-  evaluate(rows_of(fit.fit, parameters, metric), parameters.size(), fit);
+  evaluate(parameters, metric, fit);
 }
 
 void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
@@ -105,8 +123,9 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metri
         calibration::extrapolated(fit.fit.prediction.solution, fit.fit.linearisation.by_coordinate, step);
     ++fit.evaluations;
     try {
-      WeightedFit trial = weigh(evaluator, parameters, metric, fit.fit.u + step, &near);
+      WeightedFit trial = predicted(evaluator, parameters, metric, fit.fit.u + step, &near);
       if (trial.objective < fit.objective) {
+        add_slopes(evaluator, parameters, trial);
         const double kept = (fit.objective - trial.objective) / promised;
         trial.evaluations = fit.evaluations;
         fit = std::move(trial);
