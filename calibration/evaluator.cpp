@@ -51,6 +51,7 @@ Prediction Evaluator::predict(const simulation::Model& model, const simulation::
     const ScanMotion motion(fields.scan_motion, scan.points());
     pose.scan_points = motion.corrected(scan.points());
     scan_to_model(skins_[m], pose.scan_points, pose.distances);
+    for (const int point : scene_.measurements[m]->left_out) pose.distances.closest.on_border[point] = true;
     model_to_scan(scan, motion.as_given(skins_[m].node_points()), motion.directions_as_given(skins_[m].node_normals()),
                   {}, pose.to_scan);
   }

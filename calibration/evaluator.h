@@ -21,6 +21,7 @@ struct Measurement {
   simulation::PoseLoad pose;
   Scan scan;
   std::optional<double> noise_mm;  ///< of the scanner along the normal, 1 sigma; none = to be estimated
+  std::vector<int> left_out = {};  ///< scan points that say nothing: they count as beyond the skin's border
 };
 
 /// What does not change while parameters do. Everything it points to must outlive its users.

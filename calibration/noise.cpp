@@ -9,6 +9,7 @@
 #include <numeric>
 #include <vector>
 
+#include "calibration/neighbour_search.h"
 #include "calibration/statistics.h"
 #include "common/error.h"
 
@@ -20,30 +21,33 @@ constexpr Eigen::Index most_queries = 3000;
 constexpr Eigen::Index least_points = 40;
 constexpr double mad_to_sigma = 1.482602;  // of a normal law
 
-std::vector<int> nearest(const Points& place, Eigen::Index query) {
-  const Eigen::VectorXd distance = (place.rowwise() - place.row(query)).rowwise().squaredNorm();
-  std::vector<int> order(static_cast<std::size_t>(place.rows()));
-  std::iota(order.begin(), order.end(), 0);
-  const auto closer = [&distance](int a, int b) {
-    return distance[a] != distance[b] ? distance[a] < distance[b] : a < b;
-  };
-  std::nth_element(order.begin(), order.begin() + neighbours, order.end(), closer);
-  order.resize(neighbours + 1);
-  std::sort(order.begin(), order.end(), closer);
-  order.erase(order.begin());  // the point itself
-  return order;
+std::vector<int> others_near(const NeighbourSearch& search, Eigen::Index query) {
+  std::vector<int> around;
+  for (const auto& [squared, row] : search.nearest(search.points().row(query), neighbours + 1))
+    if (row != query) around.push_back(row);
+  around.resize(neighbours);  // a point in the very same place may stand before the point itself
+  return around;
+}
+
+void check_count(const Points& place) {
+  if (place.rows() < least_points)
+    throw InputError(fmt::format("the noise cannot be estimated from {} points (least {}); give noise_mm", place.rows(),
+                                 least_points));
 }
 
 /// Deviation of the point from the plane through its neighbours' distances, in units of the noise of one point.
-double standardised_deviation(const Points& place, const Eigen::VectorXd& distance_mm, Eigen::Index query) {
-  const std::vector<int> around = nearest(place, query);
+double standardised_deviation(const NeighbourSearch& search, const Eigen::VectorXd& distance_mm, Eigen::Index query) {
+  const Points& place = search.points();
+  const std::vector<int> around = others_near(search, query);
   Eigen::Matrix<double, neighbours, 3> arm;
   Eigen::Matrix<double, neighbours, 1> d;
   for (int k = 0; k < neighbours; ++k) {
     arm.row(k) = place.row(around[static_cast<std::size_t>(k)]) - place.row(query);
     d[k] = distance_mm[around[static_cast<std::size_t>(k)]];
   }
-  const Eigen::JacobiSVD<Eigen::Matrix<double, neighbours, 3>> svd(arm, Eigen::ComputeFullV);
+  // Directions of the neighbours among themselves: the point in question may stand off them.
+  const Eigen::Matrix<double, neighbours, 3> centred = arm.rowwise() - arm.colwise().mean();
+  const Eigen::JacobiSVD<Eigen::Matrix<double, neighbours, 3>> svd(centred, Eigen::ComputeFullV);
   Eigen::Matrix<double, neighbours, 3> design;  // 1, and the two directions of the surface
   design.col(0).setOnes();
   design.rightCols<2>() = arm * svd.matrixV().leftCols<2>();
@@ -56,15 +60,27 @@ double standardised_deviation(const Points& place, const Eigen::VectorXd& distan
 }  // namespace
 
 double estimate_noise_mm(const Points& place, const Eigen::VectorXd& distance_mm) {
-  if (place.rows() < least_points)
-    throw InputError(fmt::format("the noise cannot be estimated from {} points (least {}); give noise_mm", place.rows(),
-                                 least_points));
+  check_count(place);
+  const NeighbourSearch search(place);
   const Eigen::Index stride = (place.rows() + most_queries - 1) / most_queries;
   std::vector<double> deviation(static_cast<std::size_t>((place.rows() + stride - 1) / stride));
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < deviation.size(); ++i)
-    deviation[i] = std::abs(standardised_deviation(place, distance_mm, static_cast<Eigen::Index>(i) * stride));
+    deviation[i] = std::abs(standardised_deviation(search, distance_mm, static_cast<Eigen::Index>(i) * stride));
   return mad_to_sigma * percentile(deviation, 0.5);
+}
+
+std::vector<int> points_that_stand_out(const Points& place, const Eigen::VectorXd& distance_mm, double noise_mm,
+                                       double sigmas) {
+  check_count(place);
+  const NeighbourSearch search(place);
+  Eigen::VectorXd deviation(place.rows());
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index i = 0; i < deviation.size(); ++i) deviation[i] = standardised_deviation(search, distance_mm, i);
+  std::vector<int> rows;
+  for (Eigen::Index i = 0; i < deviation.size(); ++i)
+    if (std::abs(deviation[i]) > sigmas * noise_mm) rows.push_back(static_cast<int>(i));
+  return rows;
 }
 
 }  // namespace supine::calibration

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "common/arrays.h"
 
@@ -15,5 +16,11 @@ namespace supine::calibration {
 /// @param distance_mm  #R, signed
 /// @throws InputError  fewer than 40 points
 double estimate_noise_mm(const Points& place, const Eigen::VectorXd& distance_mm);
+
+/// Rows that no noise explains: further from the plane through their neighbours' distances than @p sigmas times the
+/// noise. Of a normal law one in 16,000 is, at four sigmas. Patches of points that are off together stay.
+/// @throws InputError  fewer than 40 points
+std::vector<int> points_that_stand_out(const Points& place, const Eigen::VectorXd& distance_mm, double noise_mm,
+                                       double sigmas = 4);
 
 }  // namespace supine::calibration

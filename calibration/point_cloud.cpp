@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "calibration/point_cloud.h"
 
-#include <CGAL/Orthogonal_k_neighbor_search.h>
-#include <CGAL/Search_traits_3.h>
-#include <CGAL/Search_traits_adapter.h>
-#include <CGAL/Simple_cartesian.h>
-#include <CGAL/property_map.h>
-
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/QR>
@@ -19,11 +13,6 @@
 
 namespace supine::calibration {
 namespace {
-
-using Kernel = CGAL::Simple_cartesian<double>;
-using Item = std::pair<Kernel::Point_3, int>;
-using Traits = CGAL::Search_traits_adapter<Item, CGAL::First_of_pair_property_map<Item>, CGAL::Search_traits_3<Kernel>>;
-using Search = CGAL::Orthogonal_k_neighbor_search<Traits>;
 
 constexpr int spacing_neighbours = 6;
 constexpr double least_root = 1e-3;
@@ -51,45 +40,17 @@ Fit fit_surface(const Points& around) {
   return {centre.transpose() + axes.col(0) * c[0], axes * normal, c[3] / (reach * reach)};
 }
 
-std::vector<Item> items_of(const Points& points) {
-  std::vector<Item> items;
-  for (int i = 0; i < points.rows(); ++i) {
-    items.emplace_back(Kernel::Point_3(points(i, 0), points(i, 1), points(i, 2)), i);
-  }
-  return items;
-}
-
 }  // namespace
 
-struct PointCloud::Tree {
-  explicit Tree(const Points& all) : points(all) {
-    const auto items = items_of(all);
-    tree.insert(items.begin(), items.end());
-    tree.build();
-  }
-
-  // Squared distance and row of the nearest points, nearest first; of equally near ones the lower row first.
-  std::vector<std::pair<double, int>> nearest(const Eigen::Vector3d& query, int count) const {
-    Search search(tree, Kernel::Point_3(query.x(), query.y(), query.z()), count);
-    std::vector<std::pair<double, int>> found;
-    for (const auto& [item, squared] : search) found.emplace_back(squared, item.second);
-    std::sort(found.begin(), found.end());
-    return found;
-  }
-
-  const Points points;
-  Search::Tree tree;
-};
-
 PointCloud::PointCloud(const Points& points)
-    : tree_(std::make_unique<Tree>(points)),
+    : tree_(points),
       foot_(points.rows(), 3),
       normal_(points.rows(), 3),
       curvature_(points.rows()),
       spacing_mm_(points.rows()) {
 #pragma omp parallel for schedule(static)
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    const auto near = tree_->nearest(points.row(i), neighbours + 1);
+    const auto near = tree_.nearest(points.row(i), neighbours + 1);
     Points around(near.size(), 3);
     double sum = 0;
     for (std::size_t k = 0; k < near.size(); ++k) {
@@ -104,15 +65,11 @@ PointCloud::PointCloud(const Points& points)
   }
 }
 
-PointCloud::~PointCloud() = default;
-PointCloud::PointCloud(PointCloud&&) noexcept = default;
-PointCloud& PointCloud::operator=(PointCloud&&) noexcept = default;
-
 bool PointCloud::one_sided(const Eigen::Vector3d& foot, const Eigen::Vector3d& normal) const {
   const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
   std::vector<double> angles;
-  for (const auto& [squared, row] : tree_->nearest(foot, neighbours)) {
-    const Eigen::Vector3d offset = tree_->points.row(row).transpose() - foot;
+  for (const auto& [squared, row] : tree_.nearest(foot, neighbours)) {
+    const Eigen::Vector3d offset = tree_.points().row(row).transpose() - foot;
     const double x = offset.dot(u), y = offset.dot(v);
     if (x * x + y * y > same_place * spacing_mm_[row] * spacing_mm_[row]) angles.push_back(std::atan2(y, x));
   }
@@ -123,9 +80,9 @@ bool PointCloud::one_sided(const Eigen::Vector3d& foot, const Eigen::Vector3d& n
 }
 
 PointCloud::Hit PointCloud::closest(const Eigen::Vector3d& query) const {
-  const int point = tree_->nearest(query, 1).front().second;
+  const int point = tree_.nearest(query, 1).front().second;
   const Eigen::Vector3d normal = normal_.row(point);
-  const Eigen::Vector3d nearest = tree_->points.row(point);
+  const Eigen::Vector3d nearest = tree_.points().row(point);
   const Eigen::Vector3d offset = query - nearest;
   const double along_mm = (offset - normal * normal.dot(offset)).norm();
   if (along_mm > reach_spacings * spacing_mm_[point]) return {point, nearest, true};

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <memory>
-
-#include "common/arrays.h"
+#include "calibration/neighbour_search.h"
 
 namespace supine::calibration {
 
@@ -21,9 +19,6 @@ class PointCloud {
 
   /// @pre  more points than neighbours
   explicit PointCloud(const Points& points);
-  ~PointCloud();
-  PointCloud(PointCloud&&) noexcept;
-  PointCloud& operator=(PointCloud&&) noexcept;
 
   /// What lies closest to a query point.
   struct Hit {
@@ -42,8 +37,7 @@ class PointCloud {
   // Whether the neighbours of a point of the surface lie within a half-plane around it.
   bool one_sided(const Eigen::Vector3d& foot, const Eigen::Vector3d& normal) const;
 
-  struct Tree;
-  std::unique_ptr<Tree> tree_;
+  NeighbourSearch tree_;
   Points foot_;  // where the fit crosses the normal through the neighbours' centre
   Points normal_;
   Eigen::VectorXd curvature_;  // 1/mm; > 0: hollow on the normal's side

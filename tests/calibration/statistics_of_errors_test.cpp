@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <iterator>
 #include <random>
 
 #include "calibration/error_model.h"
@@ -68,6 +70,24 @@ TEST(Noise, NeedsPoints) {
   EXPECT_THROW(estimate_noise_mm(r.place, r.distance_mm), InputError);
 }
 
+TEST(Noise, OneInTwentyPointsOffByFiveMillimetresIsFound) {
+  Residuals r = patch(2000, 0.7, 0.7, 60, 12);
+  EXPECT_LE(points_that_stand_out(r.place, r.distance_mm, 0.7).size(), 1u);
+  std::vector<int> moved;
+  for (int i = 7; i < 2000; i += 20) {
+    const double off_mm = i % 40 < 20 ? 5 : -5;
+    r.distance_mm[i] += off_mm;
+    r.place.row(i) += off_mm * Eigen::RowVector3d(r.place(i, 0) / 75, r.place(i, 1) / 75, 1).normalized();
+    moved.push_back(i);
+  }
+  EXPECT_NEAR(estimate_noise_mm(r.place, r.distance_mm), 0.7, 0.15);
+  const std::vector<int> found = points_that_stand_out(r.place, r.distance_mm, 0.7);
+  std::vector<int> right;
+  std::set_intersection(found.begin(), found.end(), moved.begin(), moved.end(), std::back_inserter(right));
+  EXPECT_GE(right.size(), 95u) << "of 100";
+  EXPECT_LE(found.size() - right.size(), 2u);
+}
+
 TEST(ErrorModel, WhiteNoiseSharesNothing) {
   const Residuals r = patch(1000, 0.7, 0, 10, 2);
   const ErrorModel model = fit_error_model(r, smooth_slopes(r));
@@ -122,7 +142,9 @@ TEST(HeldOut, BlocksAreSixPiecesThatDoNotDependOnOrder) {
   for (int b = 0; b < 6; ++b) EXPECT_GT((block.array() == b).count(), 40) << b;
   for (Eigen::Index i = 0; i < r.size(); ++i)
     for (Eigen::Index j = 0; j < r.size(); j += 37)
-      if (p.place.row(j) == r.place.row(i)) EXPECT_EQ(block[i], other[j]);
+      if (p.place.row(j) == r.place.row(i)) {
+        EXPECT_EQ(block[i], other[j]);
+      }
 }
 
 TEST(HeldOut, IsTheErrorOfAFitWithoutTheBlock) {
@@ -142,7 +164,9 @@ TEST(HeldOut, IsTheErrorOfAFitWithoutTheBlock) {
     const Eigen::MatrixXd hb = slope.transpose() * kept.asDiagonal() * slope + Eigen::MatrixXd(priors.asDiagonal());
     const Eigen::VectorXd without = -hb.ldlt().solve(slope.transpose() * kept.cwiseProduct(start));
     for (Eigen::Index i = 0; i < r.size(); ++i)
-      if (blocks[i] == b) ASSERT_NEAR(predicted[i], start[i] + slope.row(i).dot(without), 1e-10);
+      if (blocks[i] == b) {
+        ASSERT_NEAR(predicted[i], start[i] + slope.row(i).dot(without), 1e-10);
+      }
   }
 }
 

@@ -91,6 +91,22 @@ TEST_F(Calibrate, GivesTheSameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(without_timing("one/calibration.json"), without_timing("two/calibration.json"));
 }
 
+TEST_F(Calibrate, LeavesOutPointsThatStandOutAndSaysSo) {
+  ASSERT_LE(run("calibrate", "as_it_is").code, 1);
+  EXPECT_EQ(json("as_it_is/calibration.json")["warnings"].dump().find("stand out"), std::string::npos);
+  int row = 0;
+  write_scan(folder() / "supine.ply", [&row](std::array<double, 3> p) {
+    if (row++ % 30 == 7) p[1] += 8;
+    return p;
+  });
+  const Finished finished = run("calibrate", "dirty");
+  ASSERT_LE(finished.code, 1) << finished.err;
+  EXPECT_NE(finished.err.find("supine.ply"), std::string::npos) << finished.err;
+  EXPECT_NE(finished.err.find("stand out of their neighbours"), std::string::npos) << finished.err;
+  const double clean = json("as_it_is/calibration.json")["rms_mm"].get<double>();
+  EXPECT_NEAR(json("dirty/calibration.json")["rms_mm"].get<double>(), clean, 0.1 * clean);
+}
+
 TEST_F(Calibrate, CmaesMissesAnImpossibleTargetAndSaysSo) {
   const Finished finished =
       run("calibrate", "cma", {"--method", "cmaes", "--max-evaluations", "6", "--until-mae", "0.001"});
