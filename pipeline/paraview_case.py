@@ -22,7 +22,17 @@ ARRAYS = {
     "error_map_supine.vtp": ("POINTS", "distance_mm"),
 }
 ORGANS = ("gland", "tumour")
-APART_MM = 230
+LABELS = {
+    "prone.vtu": "prone (MRI)",
+    "undeformed.vtu": "undeformed",
+    "supine.vtu": "supine, predicted",
+    "comparison.vtp": "distance to the scan",
+    "scan.vtp": "distance to the model",
+    "error_map_supine.vtp": "error map of the diagnosis",
+}
+APART_MM = 200
+LABEL_MM = 85  # over the middle of a body
+SIZE = (1500, 1050)
 # Okabe and Ito: inner, skin, ligament, cut. ColorBrewer RdBu for distances, symmetric about 0.
 REGION_NAMES = ("inner", "skin", "ligament", "cut")
 REGION_COLOURS = (0.00, 0.45, 0.70, 0.94, 0.89, 0.26, 0.84, 0.37, 0.00, 0.80, 0.47, 0.65)
@@ -45,6 +55,15 @@ def colour_distances(simple):
     return table
 
 
+def label(simple, view, text, place):
+    simple.RenameSource(text + " (label)", simple.Text(Text=text))
+    shown = simple.Show(simple.FindSource(text + " (label)"), view)
+    shown.TextPropMode = "Billboard 3D Text"
+    shown.BillboardPosition = [place[0] - 0.4 * APART_MM, place[1], place[2] + LABEL_MM]
+    shown.Color = [0.1, 0.1, 0.1]
+    shown.FontSize = 22
+
+
 def show_pose(simple, view, folder, name, place):
     pose = simple.XMLUnstructuredGridReader(registrationName=name, FileName=[os.path.join(folder, name + ".vtu")])
     boundary = simple.Threshold(registrationName=name + " surface", Input=pose, Scalars=["CELLS", "region"],
@@ -59,16 +78,72 @@ def show_pose(simple, view, folder, name, place):
             inside = simple.Show(simple.XMLPolyDataReader(registrationName=f"{name} {organ}", FileName=[path]), view)
             inside.DiffuseColor = [0.84, 0.37, 0.0]
             inside.Position = place
+    return pose
 
 
-def show_distances(simple, view, folder, name, place, table):
-    shown = simple.Show(simple.XMLPolyDataReader(registrationName=name, FileName=[os.path.join(folder, name)]), view)
+def show_distances(simple, view, folder, name, place):
+    skin = simple.XMLPolyDataReader(registrationName=name, FileName=[os.path.join(folder, name)])
+    coloured = skin
+    if name == "comparison.vtp":  # where the scan has a hole a distance says nothing: grey
+        coloured, hole = (simple.Threshold(registrationName=f"{name} {what}", Input=skin, Scalars=["POINTS", "covered"],
+                                           LowerThreshold=1, UpperThreshold=1, Invert=invert)
+                          for what, invert in (("covered", 0), ("not covered", 1)))
+        bare = simple.Show(hole, view)
+        simple.ColorBy(bare, None)
+        bare.AmbientColor = bare.DiffuseColor = [0.72, 0.72, 0.72]
+        bare.Position = place
+    shown = simple.Show(coloured, view)
     simple.ColorBy(shown, ("POINTS", "distance_mm"))
     shown.Position = place
+    return skin
+
+
+def centre_of(source):
+    x0, x1, y0, y1, z0, z1 = source.GetDataInformation().GetBounds()
+    return [(x0 + x1) / 2, (y0 + y1) / 2, (z0 + z1) / 2]
+
+
+def lay_out(simple, view, folder, names):
+    """Shapes in the upper row, error maps in the lower one. Returns where the picture's middle is, and how wide it is."""
+    columns, centre = {0: 0, 1: 0}, None
+    for name in names:
+        row = 0 if name.endswith(".vtu") else 1
+        on_model = name == "scan.vtp" and columns[1] > 0
+        column = columns[row] - (1 if on_model else 0)
+        place = [column * APART_MM, 0.0, -row * APART_MM]
+        show = show_pose if row == 0 else show_distances
+        source = show(simple, view, folder, name[:-4] if row == 0 else name, place)
+        if on_model:  # over the model's skin: to be switched on in the browser of the pipeline
+            simple.Hide(source, view)
+            continue
+        if centre is None:
+            centre = centre_of(source)
+        label(simple, view, LABELS[name], [c + p for c, p in zip(centre, place)])
+        columns[row] += 1
+    across, down = max(columns.values()), 1 + (columns[1] > 0)
+    middle = [centre[0] + (across - 1) * APART_MM / 2, centre[1], centre[2] - (down - 1) * APART_MM / 2]
+    return middle, across * APART_MM, down * APART_MM
+
+
+def look_from_the_front(view, middle, width_mm, height_mm):
+    """Patient's right at the left of the picture, head up."""
+    view.CameraParallelProjection = 1
+    view.CameraFocalPoint = middle
+    view.CameraPosition = [middle[0], middle[1] - 1500, middle[2]]
+    view.CameraViewUp = [0, 0, 1]
+    view.CameraParallelScale = max(height_mm / 2, width_mm / 2 * SIZE[1] / SIZE[0]) * 1.05
+
+
+def show_legend(simple, view, table):
     table.RescaleTransferFunction(-RANGE_MM, RANGE_MM)
     bar = simple.GetScalarBar(table, view)
-    bar.Title, bar.ComponentTitle = "distance, mm", "scan outside > 0"
-    shown.SetScalarBarVisibility(view, True)
+    bar.Title, bar.ComponentTitle = "scan outside the model, mm", ""
+    bar.TitleFontSize, bar.LabelFontSize = 18, 18
+    bar.TitleColor = bar.LabelColor = [0.1, 0.1, 0.1]
+    bar.LabelFormat = bar.RangeLabelFormat = "%.0f"
+    bar.AutoOrient, bar.Orientation, bar.WindowLocation = 0, "Horizontal", "Lower Right Corner"
+    bar.ScalarBarLength = 0.25
+    bar.Visibility = 1
 
 
 def main():
@@ -80,29 +155,19 @@ def main():
         raise SystemExit(f"{folder} holds no results: set CASE_OUT to the out folder of a case that make has run")
     view = simple.GetActiveViewOrCreate("RenderView")
     view.OrientationAxesVisibility = 1
+    view.UseColorPaletteForBackground = 0
+    view.Background = [1, 1, 1]
+    view.ViewSize = list(SIZE)
     colour_regions(simple)
     table = colour_distances(simple)
-    column = 0
-    for name in there:
-        place = [column * APART_MM, 0.0, 0.0]
-        if name.endswith(".vtu"):
-            show_pose(simple, view, folder, name[:-4], place)
-        elif name == "scan.vtp":
-            place[0] -= APART_MM  # over the model's skin
-            show_distances(simple, view, folder, name, place, table)
-            simple.Hide(simple.FindSource(name), view)
-            continue
-        else:
-            show_distances(simple, view, folder, name, place, table)
-        column += 1
-    # From the front: patient's right at the left of the picture, head up.
-    simple.ResetCamera(view)
-    view.CameraPosition = [view.CameraFocalPoint[0], view.CameraFocalPoint[1] - 1500, view.CameraFocalPoint[2]]
-    view.CameraViewUp = [0, 0, 1]
-    simple.ResetCamera(view)
+    middle, width_mm, height_mm = lay_out(simple, view, folder, there)
+    if any(name.endswith(".vtp") for name in there):
+        show_legend(simple, view, table)
+    simple.Render(view)  # the first one sets a camera of its own
+    look_from_the_front(view, middle, width_mm, height_mm)
     simple.Render(view)
     if len(sys.argv) > 1 and sys.argv[-1].endswith(".png"):
-        simple.SaveScreenshot(sys.argv[-1], view, ImageResolution=[1800, 700])
+        simple.SaveScreenshot(sys.argv[-1], view, ImageResolution=list(SIZE))
 
 
 if __name__ in ("__main__", "__vtkconsole__"):

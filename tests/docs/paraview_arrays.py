@@ -26,6 +26,9 @@ def main():
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     found = 0
+    if 'Name="covered"' not in section((out / "comparison.vtp").read_bytes().decode("latin-1"), "POINTS"):
+        print("comparison.vtp has no array covered")
+        return 1
     for name, (association, array) in script.ARRAYS.items():
         if not (out / name).exists():
             continue
@@ -37,7 +40,8 @@ def main():
         print(f"{out} holds {found} of the files the script opens")
         return 1
     simple = mock.MagicMock()
-    simple.GetActiveViewOrCreate.return_value.CameraFocalPoint = [0.0, 0.0, 0.0]
+    for reader in (simple.XMLUnstructuredGridReader, simple.XMLPolyDataReader):
+        reader.return_value.GetDataInformation.return_value.GetBounds.return_value = (-80.0, 80.0, -40.0, 0.0, -80.0, 80.0)
     package = types.ModuleType("paraview")
     package.simple = simple
     os.environ["CASE_OUT"] = str(out)
@@ -47,7 +51,7 @@ def main():
     opened = [call.kwargs["FileName"][0] for reader in (simple.XMLUnstructuredGridReader, simple.XMLPolyDataReader)
               for call in reader.call_args_list]
     missing = [path for path in opened if not os.path.exists(path)]
-    coloured = {call.args[1] for call in simple.ColorBy.call_args_list}
+    coloured = {call.args[1] for call in simple.ColorBy.call_args_list if call.args[1]}
     print(f"{found} files, {len(opened)} opened")
     return 0 if not missing and coloured == {("CELLS", "region"), ("POINTS", "distance_mm")} else 1
 
