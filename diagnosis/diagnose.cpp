@@ -48,14 +48,16 @@ double p_of(const ScoreTable& table) {
   return p;
 }
 
-/// Share of what unfitted poses have above the noise that the refit takes away, in squares; none without such a pose. A
-/// scan that lies elsewhere says nothing of where another one lies.
+/// Share of what poses predicted without themselves have above the noise that the refit takes away, in squares; none
+/// without such a pose. A scan that lies elsewhere says nothing of where one that was not fitted lies.
 std::optional<double> pose_fall(const Refit& refit, const BaseFigures& base) {
-  if (refit.effect == "misregistration" || refit.pose_rms_mm.empty() ||
-      refit.pose_rms_mm.size() != base.pose_rms_mm.size())
-    return {};
-  const double noise = base.noise_mm * base.noise_mm, before = std::pow(pose_rms(base.pose_rms_mm), 2) - noise;
-  const double after = std::pow(pose_rms(refit.pose_rms_mm), 2) - noise;
+  const std::size_t silent = refit.effect == "misregistration" ? base.unfitted_poses : 0;
+  if (refit.pose_rms_mm.size() != base.pose_rms_mm.size() || base.pose_rms_mm.size() <= silent) return {};
+  const auto rms_of = [silent](const std::vector<double>& poses) {
+    return pose_rms({poses.begin() + static_cast<std::ptrdiff_t>(silent), poses.end()});
+  };
+  const double noise = base.noise_mm * base.noise_mm, before = std::pow(rms_of(base.pose_rms_mm), 2) - noise;
+  const double after = std::pow(rms_of(refit.pose_rms_mm), 2) - noise;
   return (before - after) / std::max(before, 0.01 * noise);
 }
 

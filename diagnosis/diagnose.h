@@ -46,8 +46,9 @@ LackOfFit lack_of_fit(const WeightedFit& fit, const Metric& metric);
 /// The base model as refits are compared with it.
 struct BaseFigures {
   double rms_mm = 0, held_out_rms_mm = 0, noise_mm = 0;
-  std::vector<double> pose_rms_mm;  ///< poses that were not fitted
+  std::vector<double> pose_rms_mm;  ///< poses that were not fitted, then fitted ones left out
   LackOfFit left;
+  std::size_t unfitted_poses = 0;  ///< how many of these were not fitted
 };
 
 struct Diagnosis {

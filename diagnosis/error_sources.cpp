@@ -34,6 +34,13 @@ std::string source_of(const std::string& effect) {
   return {};
 }
 
+/// The shape in each pose by itself: scans lie elsewhere, and breath stands elsewhere, in their own ways.
+void add_by_pose(const Residuals& residuals, const ErrorMode& mode, std::vector<ErrorMode>& modes) {
+  for (int pose = 0; pose <= residuals.pose.maxCoeff(); ++pose)
+    modes.push_back(
+        {mode.source, (residuals.pose.array() == pose).select(mode.shape_mm, Eigen::VectorXd::Zero(residuals.size()))});
+}
+
 }  // namespace
 
 double tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& t) {
@@ -68,9 +75,15 @@ ErrorSources error_sources(const Residuals& residuals, const std::vector<Candida
   sources.length_mm = fallback.length_mm;
   for (const Candidate& candidate : candidates) {
     const std::string source = source_of(candidate.effect);
-    for (std::size_t k = 0; !source.empty() && k < candidate.parameters.size(); ++k)
-      sources.modes.push_back({source, tolerance_for(candidate.effect, candidate.parameters[k].unit, tolerances) *
-                                           candidate.slope.col(static_cast<Eigen::Index>(k))});
+    const bool of_one_image = source == "segmentation" || source == "numerical";
+    for (std::size_t k = 0; !source.empty() && k < candidate.parameters.size(); ++k) {
+      const ErrorMode mode{source, tolerance_for(candidate.effect, candidate.parameters[k].unit, tolerances) *
+                                       candidate.slope.col(static_cast<Eigen::Index>(k))};
+      if (of_one_image)
+        sources.modes.push_back(mode);
+      else
+        add_by_pose(residuals, mode, sources.modes);
+    }
   }
   if (numerical != nullptr) set_numerical(*numerical, tolerances, sources);
   return sources;

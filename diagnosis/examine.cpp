@@ -89,6 +89,9 @@ void judge_base(const RefitProblem& problem, Findings& found) {
   f.noise_mm = rms(found.sources.noise_mm);
   f.left = lack_of_fit(found.base, found.metric);
   f.pose_rms_mm = unfitted_rms_mm(problem, found.model);
+  f.unfitted_poses = f.pose_rms_mm.size();
+  const std::vector<double> left_out = left_out_pose_rms_mm(found.base, calibration::FreeParameters(found.model));
+  f.pose_rms_mm.insert(f.pose_rms_mm.end(), left_out.begin(), left_out.end());
 }
 
 /// Sizes and intervals of what is named, with the mesh's error measured again where it is in the model.

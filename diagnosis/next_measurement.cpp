@@ -32,9 +32,11 @@ std::vector<Option> options_of(const Subject& subject) {
     const double a = degrees * std::numbers::pi / 180;
     return (std::cos(a) * down + std::sin(a) * to).normalized();
   };
+  const Eigen::Vector3d& lateral = subject.fitted.anatomy->lateral;
+  const std::string side = lateral.x() > 0 ? "left" : "right";
   return {{subject.fitted.measurements[0]->pose.name + ", once more", down, true},
           {"tilted 45 degrees, head up", tilted(45, feet)},
-          {"tilted 45 degrees to the outer side", tilted(45, subject.fitted.anatomy->lateral)},
+          {"tilted 45 degrees to the patient's " + side, tilted(45, lateral)},
           {"upright", feet}};
 }
 

@@ -10,7 +10,7 @@ namespace supine::diagnosis {
 
 /// What a further measurement would do for the causes that cannot be told apart, or could not be seen.
 struct Separation {
-  std::string measurement;   ///< supine (again), tilt_30_head_up, tilt_45_head_up, tilt_45_side, upright
+  std::string measurement;   ///< in words: the fitted pose once more, tilts, upright
   double separation = 0;     ///< expected fall of F between the closest pair of the set, all free parameters refitted
   std::string closest_pair;  ///< the two it separates least, "a / b"
   double single_power = 0;   ///< mean chance to find an effect that cannot be seen now

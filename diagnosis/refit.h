@@ -26,7 +26,7 @@ struct Refit {
   double gain = 0;        ///< fall of F from the base model's
   double bic = 0;         ///< gain − freedom · ln n − Σ ln(prior variance / variance) over its place and shape
   double rms_mm = 0, held_out_rms_mm = 0;   ///< fitted points; every block of skin without itself
-  std::vector<double> pose_rms_mm;          ///< of every pose that was not fitted
+  std::vector<double> pose_rms_mm;          ///< of every pose that was not fitted, then of each fitted one left out
   std::vector<FittedParameter> parameters;  ///< of the effect
   simulation::Model model;                  ///< with the fitted numbers
   WeightedFit fit;
@@ -64,5 +64,8 @@ Eigen::VectorXd prior_information(const calibration::FreeParameters& parameters)
 
 /// Root mean square distance of each pose that is not fitted.
 std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model);
+
+/// RMS distance of each fitted pose as it would be without it, by one linear step; empty with fewer than two.
+std::vector<double> left_out_pose_rms_mm(const WeightedFit& fit, const calibration::FreeParameters& parameters);
 
 }  // namespace supine::diagnosis

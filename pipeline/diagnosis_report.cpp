@@ -171,7 +171,8 @@ std::string where(const std::vector<diagnosis::HotSpot>& spots) {
 std::string pose_fall(const Findings& found, const Refit& refit) {
   const auto& before = found.figures.pose_rms_mm;
   if (before.empty() || before.size() != refit.pose_rms_mm.size()) return {};
-  std::string text = before.size() == 1 ? ", unfitted pose" : ", unfitted poses";
+  const bool none_fitted = found.figures.unfitted_poses == before.size();
+  std::string text = fmt::format(", {} pose{}", none_fitted ? "unfitted" : "left-out", before.size() == 1 ? "" : "s");
   for (std::size_t i = 0; i < before.size(); ++i)
     text += fmt::format("{} {:.2f} -> {:.2f}", i > 0 ? "," : "", before[i], refit.pose_rms_mm[i]);
   return text + " mm";

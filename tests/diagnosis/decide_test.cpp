@@ -105,7 +105,10 @@ TEST(Decide, AScanThatLiesElsewhereIsNotJudgedByAnotherScan) {
   const Refit shifted = refit("misregistration", 60, 1.8, {1.3});
   ScoreTable table = table_with(0.001);
   table.scores[0].effect = "misregistration";
+  base.unfitted_poses = 1;
   EXPECT_EQ(decide(table, {shifted}, {nothing_left}, base).verdict, Verdict::missing);
+  base.unfitted_poses = 0;  // fitted with one shift for both: each must show the other's
+  EXPECT_EQ(decide(table, {shifted}, {nothing_left}, base).verdict, Verdict::unexplained);
 }
 
 TEST(Decide, WhatComesNearIsARivalWhetherItCountsOrNot) {

@@ -29,6 +29,21 @@ TEST(ErrorSources, AModeIsTheToleranceTimesTheSlopeAndTissueEffectsHaveNone) {
   EXPECT_EQ(tolerance_for("misregistration", "rad", {}), Tolerances{}.registration_rad);
 }
 
+TEST(ErrorSources, EveryScanLiesElsewhereAndBreathesInItsOwnWay) {
+  auto r = supine::testing::sheet(3);
+  const Eigen::Index half = r.size() / 2;
+  r.pose.tail(r.size() - half).setOnes();
+  const ErrorSources sources = error_sources(r, candidates_of(r.size()), nullptr, {0.7, 0, 1});
+  ASSERT_EQ(sources.modes.size(), 6u);
+  const char* source[] = {"registration", "registration", "segmentation", "chest_wall", "chest_wall", "numerical"};
+  for (std::size_t m = 0; m < 6; ++m) EXPECT_EQ(sources.modes[m].source, source[m]) << m;
+  for (const std::size_t m : {0u, 3u}) {
+    EXPECT_TRUE(sources.modes[m].shape_mm.tail(r.size() - half).isZero(0));
+    EXPECT_TRUE(sources.modes[m + 1].shape_mm.head(half).isZero(0));
+    EXPECT_TRUE((sources.modes[m].shape_mm.head(half).array() > 0).all());
+  }
+}
+
 TEST(ErrorSources, WithoutToleranceTakesTheEffectsOwnModeOnly) {
   const auto r = supine::testing::sheet(2);
   const ErrorSources sources = error_sources(r, candidates_of(r.size()), nullptr, {0.7, 0, 1});
