@@ -13,7 +13,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 NAMES = {"linear": "linear", "graded": "linear, short edges where the skin ends", "quadratic": "quadratic, bent",
-         "by-error": "linear, sized by error"}
+         "by-error": "linear, sized by error", "both-half": "quadratic, bent, half edges where the skin ends"}
 
 
 def main():
@@ -34,8 +34,8 @@ def main():
         axis.set_ylabel("RMS to the reference, mm")
         axis.grid(True, which="both", alpha=0.3)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="lower center", ncol=4)
-    figure.tight_layout(rect=(0, 0.07, 1, 1))
+    figure.legend(handles, labels, loc="lower center", ncol=3)
+    figure.tight_layout(rect=(0, 0.1, 1, 1))
     figure.savefig(sys.argv[2], dpi=120)
 
 

@@ -1,11 +1,12 @@
 #!/bin/bash
 # SPDX-License-Identifier: AGPL-3.0-or-later
 # What the mesh does to the answer: the supine skin of one computed breast at the generator's own moduli on meshes of
-# growing face count (linear; with short edges where the skin ends; sized by the error of a first solution; quadratic and bent), each against the finest.
+# growing face count (linear; with short edges where the skin ends; sized by the error of a first solution; quadratic and bent; both), each against the finest.
 # Writes WORK/mesh_choice.csv; bench/mesh_choice.py draws it (docs/meshing.md).
 #
 #   bench/mesh_choice.sh DATA/hidden-open CASE WORK [BIN]
 #
+# ROWS, a regular expression, takes some rows only, for example ROWS='^(linear-2500|reference-7000)$'.
 # Results already in WORK are kept: an interrupted study goes on, a row is redone by deleting its folder.
 source "$(dirname "$0")/mesh_common.sh"
 
@@ -13,6 +14,7 @@ source "$(dirname "$0")/mesh_common.sh"
 rows=()
 solve() {
   local kind=$1 triangles=$2 out=$work/$1-$2
+  [[ $kind-$triangles =~ ${ROWS:-.} ]] || return 0
   rows+=("$kind-$triangles")
   [ ! -e "$out/row.csv" ] || return 0
   mkdir -p "$out"
@@ -36,6 +38,10 @@ for n in 600 1300 2500 5000 10000; do solve linear "$n"; done
 for n in 600 1300 2500 5000; do solve graded "$n" --skin-edge-mm "$(quarter "$n")"; done
 for n in 10000 20000 40000; do solve by-error-$n 2500 --error-from "$work/linear-2500/supine.vtu" --cells "$n"; done
 for n in 400 700 1300; do solve quadratic "$n" --order 2 --fine "$work/breast.vtp"; done
+for n in 400 700; do
+  solve both-half "$n" --order 2 --fine "$work/breast.vtp" --skin-edge-mm "$(awk "BEGIN {print 2 * $(quarter "$n")}")"
+  solve both-quarter "$n" --order 2 --fine "$work/breast.vtp" --skin-edge-mm "$(quarter "$n")"
+done
 solve reference 7000 --skin-edge-mm "$(quarter 7000)"
 
 reference=$work/reference-7000/supine.vtu

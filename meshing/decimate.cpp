@@ -73,14 +73,14 @@ void DecimateOptions::check() const {
 
 DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
   options.check();
-  require_sound(in, options.open ? Borders::allowed : Borders::closed, "the surface to decimate");
+  SoundSurface sound = require_sound(in, options.open ? Borders::allowed : Borders::closed, "the surface to decimate");
   if (options.relative_size.size() != 0 && options.relative_size.size() != in.points.rows())
     throw InputError(fmt::format("there are {} relative sizes for {} points of the surface; one each is needed",
                                  options.relative_size.size(), in.points.rows()));
   Surface compact;
   DecimateOptions fitting;
   if (drop_unused_points(in, options, compact, fitting)) return decimate(compact, fitting);
-  const DecimateMeasure measure(in);
+  const DecimateMeasure measure(in, std::move(sound));
   if (coarse_enough(measure, options)) return unchanged(measure, true, "");
   DecimateResult result;
   std::string fallback;

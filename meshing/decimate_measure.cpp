@@ -100,12 +100,17 @@ std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& places,
 }
 
 DecimateMeasure::DecimateMeasure(const Surface& in)
-    : in_(in), report_(reconstruction::check_surface(in)), tree_(in.points, in.triangles) {
+    : DecimateMeasure(
+          in, {reconstruction::check_surface(in), std::make_shared<const TriangleTree>(in.points, in.triangles)}) {}
+
+DecimateMeasure::DecimateMeasure(const Surface& in, SoundSurface sound)
+    : in_(in), report_(std::move(sound.report)), tree_(std::move(sound.tree)) {
   // An input of large triangles is sampled between its points too.
   const double spacing_mm = std::sqrt(report_.area_mm2 / 200000);
   const double edge_mm =
       std::sqrt(4 * report_.area_mm2 / (std::numbers::sqrt3 * static_cast<double>(report_.triangles)));
   samples_ = edge_mm > 2 * spacing_mm ? dense_samples(in, 2 * spacing_mm) : in.points;
+  if (in.region.size() == 0 && report_.closed()) return;
   const std::vector<MeshEdge> edges = borders(in);
   if (!edges.empty()) border_ = std::make_unique<TriangleTree>(in.points, as_triangles(edges));
 }
@@ -118,7 +123,7 @@ bool DecimateMeasure::same_topology(const Surface& out) const {
 
 std::vector<Eigen::Vector3d> DecimateMeasure::places_too_far(double bound_mm, DecimateResult& result) const {
   const Points samples = dense_samples(result.surface, mean_edge(result.surface, result.quad) / samples_per_edge);
-  const Eigen::VectorXd to_input = tree_.distances_mm(samples);
+  const Eigen::VectorXd to_input = tree_->distances_mm(samples);
   const Eigen::VectorXd from_input =
       TriangleTree(result.surface.points, result.surface.triangles).distances_mm(samples_);
   result.to_input_mm = to_input.maxCoeff();
@@ -156,7 +161,7 @@ std::vector<Eigen::Vector3d> DecimateMeasure::unsound_places(const Surface& out)
                                     out.points.row(out.triangles(t, 2)))
                                        .transpose() /
                                    3;
-    const TriangleTree::Hit hit = tree_.closest(centre);
+    const TriangleTree::Hit hit = tree_->closest(centre);
     // Opposite to the input beneath: turned over. A little more than a right angle happens at sharp rims.
     const Eigen::Vector3d own = area_vector(out, t).normalized(), beneath = area_vector(in_, hit.triangle).normalized();
     if (own.dot(beneath) < -0.5) places.push_back(centre);

@@ -5,19 +5,20 @@
 #include <vector>
 
 #include "meshing/decimate.h"
-#include "meshing/triangle_tree.h"
-#include "reconstruction/surface_check.h"
+#include "meshing/sound_surface.h"
 
 namespace supine::meshing {
 
 /// Measures decimated surfaces against their input: one place for all methods and for the figures that are reported.
 class DecimateMeasure {
  public:
-  /// Keeps @p in by reference.
+  /// Keeps @p in by reference. @param sound  what require_sound() found of it
+  DecimateMeasure(const reconstruction::Surface& in, SoundSurface sound);
   explicit DecimateMeasure(const reconstruction::Surface& in);
 
   const reconstruction::Surface& input() const { return in_; }
   const reconstruction::SurfaceReport& report() const { return report_; }
+  std::shared_ptr<const TriangleTree> tree() const { return tree_; }
 
   /// Components, Euler characteristic and number of open borders' edges (none or some) are the input's; manifold.
   bool same_topology(const reconstruction::Surface& out) const;
@@ -38,7 +39,7 @@ class DecimateMeasure {
  private:
   const reconstruction::Surface& in_;
   reconstruction::SurfaceReport report_;
-  TriangleTree tree_;
+  std::shared_ptr<const TriangleTree> tree_;
   Points samples_;                        // of the input
   std::unique_ptr<TriangleTree> border_;  // of the input's borders; none without
 };

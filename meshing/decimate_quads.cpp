@@ -53,7 +53,7 @@ DecimateResult decimate_to_quads(const DecimateMeasure& measure, const DecimateO
     edge_mm = edge_for_triangles(in, options.relative_size, target.faces > 0 ? 2 * target.faces : target.triangles);
   }
   const QuadTarget asked = target;
-  QuadRemesher remesher(in, options.relative_size, edge_mm);
+  QuadRemesher remesher(in, options.relative_size, edge_mm, measure.tree());
   DecimateResult failed;
   for (int round = 0; round < most_rounds; ++round) {
     QuadMesh mesh = remesher.make(target);

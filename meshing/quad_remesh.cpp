@@ -24,7 +24,23 @@ constexpr double least_share = 0.92;  // of the triangles asked for
 constexpr double faces_tolerance = 0.02;
 constexpr int samples_per_triangle = 40;
 
+// Largest deviation from 90 degrees of what is paired before each fit: a fit straightens quads, so those before it may
+// be worse than the ones that are left. It is the geometry, not the parity of triangles, that leaves triangles alone.
+constexpr double deviations_deg[] = {80, 70, 65};
+
 double misfit(int now, int wanted) { return static_cast<double>(now) / wanted; }
+
+QuadPairs fit_quads(const FitTarget& target, FieldMesh& coarse) {
+  std::vector<int> nearest;
+  QuadPairs pairs = pair_triangles(coarse.surface, deviations_deg[0]);
+  fit_surface(target, pairs, {.rounds = 4}, coarse, nearest);
+  pairs = pair_triangles(coarse.surface, deviations_deg[1]);
+  fit_surface(target, pairs, {.rounds = 2, .emphasis = 0.5}, coarse, nearest);
+  choose_diagonals(*target.tree, pairs, coarse.surface);
+  pairs = pair_triangles(coarse.surface, deviations_deg[2]);
+  fit_surface(target, pairs, {.rounds = 3, .emphasis = 0.5}, coarse, nearest);
+  return pair_triangles(coarse.surface);
+}
 
 }  // namespace
 
@@ -32,6 +48,7 @@ struct QuadRemesher::State {
   const Surface& in;
   FieldMesh fields;  // sizes: relative × the edge length guessed
   double edge_mm;
+  std::shared_ptr<const TriangleTree> tree;  // of the input; none: the target makes it
   std::unique_ptr<FitTarget> target;
   std::vector<FieldGraph> levels;
   CrossField crosses;
@@ -59,8 +76,9 @@ struct QuadRemesher::State {
   double resolution = 1;  // wanted edge length over that the field mesh was made for
 };
 
-QuadRemesher::QuadRemesher(const Surface& in, const Eigen::VectorXd& relative, double edge_mm)
-    : state_(new State{in, {}, edge_mm, nullptr, {}, {}}) {
+QuadRemesher::QuadRemesher(const Surface& in, const Eigen::VectorXd& relative, double edge_mm,
+                           std::shared_ptr<const TriangleTree> tree)
+    : state_(new State{in, {}, edge_mm, std::move(tree), nullptr, {}, {}}) {
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(in.points.rows());
   state_->fields = field_mesh(in, edge_mm * (relative.size() > 0 ? relative : ones));
   state_->prepare();
@@ -86,7 +104,7 @@ void QuadRemesher::refine(const Points& places, double factor, double radius_mm)
   s.resolution = 1;
   s.fields = adapt(s.fields, field_share);
   // Points made by splitting chords go to the input.
-  if (!s.target) s.target = std::make_unique<FitTarget>(s.in, samples_per_triangle * 1000);
+  if (!s.target) s.target = std::make_unique<FitTarget>(s.in, samples_per_triangle * 1000, s.tree);
   project(*s.target, s.fields.surface);
   s.levels = field_hierarchy(s.fields);
   s.crosses = cross_field(s.levels);
@@ -106,7 +124,7 @@ QuadMesh QuadRemesher::make(const QuadTarget& target) {
       factor = std::sqrt(share / (0.5 + 0.5 * least_share));
       if (share <= 1 && share >= least_share) miss = 0;
     } else if (target.faces > 0) {
-      const double share = misfit(pair_triangles(coarse.surface).faces(), target.faces);
+      const double share = misfit(pair_triangles(coarse.surface, deviations_deg[1]).faces(), target.faces);
       factor = std::sqrt(share);
       miss = std::abs(share - 1) <= faces_tolerance ? 0 : std::abs(share - 1);
     }
@@ -118,16 +136,9 @@ QuadMesh QuadRemesher::make(const QuadTarget& target) {
     s.set_edge(s.edge_mm * factor);
   }
   if (!s.target)
-    s.target =
-        std::make_unique<FitTarget>(s.in, samples_per_triangle * static_cast<int>(best.surface.triangles.rows()));
-  QuadPairs pairs = pair_triangles(best.surface);
-  fit_surface(*s.target, pairs, {.rounds = 4}, best);
-  pairs = pair_triangles(best.surface);
-  fit_surface(*s.target, pairs, {.rounds = 2, .emphasis = 0.5}, best);
-  choose_diagonals(s.target->tree, pairs, best.surface);
-  pairs = pair_triangles(best.surface);
-  // Last the fit, for it straightens quads that pairing along paths has sheared.
-  fit_surface(*s.target, pairs, {.rounds = 3, .emphasis = 0.5}, best);
+    s.target = std::make_unique<FitTarget>(s.in, samples_per_triangle * static_cast<int>(best.surface.triangles.rows()),
+                                           s.tree);
+  QuadPairs pairs = fit_quads(*s.target, best);
   return {std::move(best.surface), std::move(pairs), std::move(best.size_mm)};
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "meshing/quad_pairs.h"
+#include "meshing/triangle_tree.h"
 
 namespace supine::meshing {
 
@@ -34,7 +35,9 @@ class QuadRemesher {
   /// @param in        manifold, oriented; closed or open; with regions or without; kept by reference
   /// @param relative  wanted edge length by point of @p in, as a factor, > 0; empty = 1 everywhere
   /// @param edge_mm   rough guess of the edge length: fields get a resolution that fits it
-  QuadRemesher(const reconstruction::Surface& in, const Eigen::VectorXd& relative, double edge_mm);
+  /// @param tree      of @p in, where there is one already
+  QuadRemesher(const reconstruction::Surface& in, const Eigen::VectorXd& relative, double edge_mm,
+               std::shared_ptr<const TriangleTree> tree = nullptr);
   QuadRemesher(const QuadRemesher&) = delete;
   QuadRemesher& operator=(const QuadRemesher&) = delete;
   ~QuadRemesher();

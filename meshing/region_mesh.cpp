@@ -47,7 +47,33 @@ bool RegionMesh::may_collapse(Half half) const {
     if (!on_border(stays) || !border(mesh_.edge_handle(half))) return false;
     if (!single_chain(half)) return false;
   }
-  return const_cast<HalfMesh&>(mesh_).is_collapse_ok(half);  // OpenMesh marks vertices on its way and unmarks them
+  return keeps_topology(half);
+}
+
+// The link condition, as OpenMesh's is_collapse_ok() tests it; that asks for a property by its name at every call.
+bool RegionMesh::keeps_topology(Half half) const {
+  const Half back = mesh_.opposite_halfedge_handle(half);
+  if (mesh_.status(mesh_.edge_handle(half)).deleted()) return false;
+  Vertex beside[2];
+  for (int i = 0; i < 2; ++i) {
+    const Half side = i == 0 ? half : back;
+    if (mesh_.is_boundary(side)) continue;
+    const Half next = mesh_.next_halfedge_handle(side), last = mesh_.next_halfedge_handle(next);
+    beside[i] = mesh_.to_vertex_handle(next);
+    if (mesh_.is_boundary(mesh_.opposite_halfedge_handle(next)) &&
+        mesh_.is_boundary(mesh_.opposite_halfedge_handle(last)))
+      return false;
+  }
+  if (beside[0] == beside[1]) return false;
+  const Vertex gone = mesh_.from_vertex_handle(half), stays = mesh_.to_vertex_handle(half);
+  if (mesh_.is_boundary(gone) && mesh_.is_boundary(stays) && !mesh_.is_boundary(half) && !mesh_.is_boundary(back))
+    return false;
+  for (auto a = mesh_.cvv_begin(gone); a.is_valid(); ++a) {
+    if (*a == beside[0] || *a == beside[1]) continue;
+    for (auto b = mesh_.cvv_begin(stays); b.is_valid(); ++b)
+      if (*a == *b) return false;
+  }
+  return true;
 }
 
 bool RegionMesh::may_flip(Edge edge) const { return !border(edge) && mesh_.is_flip_ok(edge); }

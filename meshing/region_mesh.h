@@ -62,6 +62,7 @@ class RegionMesh {
 
  private:
   bool single_chain(Half half) const;
+  bool keeps_topology(Half half) const;
 
   HalfMesh mesh_;
   std::vector<int> region_;

@@ -55,27 +55,28 @@ void require_areas(const Surface& surface, const std::string& what) {
                                  place(corner(surface, first, 0))));
 }
 
-void require_manifold(const Surface& surface, Borders borders, const std::string& what) {
+reconstruction::SurfaceReport require_manifold(const Surface& surface, Borders borders, const std::string& what) {
   const reconstruction::SurfaceReport report = reconstruction::check_surface(surface);
   if (!report.manifold())
     throw InputError(fmt::format(
         "{}: not a manifold: {} edges and {} points where more than two sheets meet or the orientation "
         "changes, the first at {}; repair the surface there",
         what, report.bad_edges, report.bad_points, place(surface.points.row(report.first_bad_point).transpose())));
-  if (report.border_edges == 0 || borders == Borders::allowed) return;
+  if (report.border_edges == 0 || borders == Borders::allowed) return report;
   for (const reconstruction::MeshEdge& edge : reconstruction::mesh_edges(surface.triangles))
     if (edge.count == 1)
       throw InputError(
           fmt::format("{}: not closed: {} edges belong to one triangle only, the first at {}; close the hole", what,
                       report.border_edges, place(surface.points.row(edge.points[0]).transpose())));
+  return report;
 }
 
-void require_no_crossings(const Surface& surface, const std::string& what) {
-  const auto crossings = reconstruction::self_intersections(surface);
-  if (!crossings.empty())
+void require_no_crossings(const Surface& surface, const TriangleTree& tree, const std::string& what) {
+  const auto pairs = crossings(surface, tree);
+  if (!pairs.empty())
     throw InputError(
         fmt::format("{}: intersects itself: {} pairs of triangles, the first at {}; repair the surface there", what,
-                    crossings.size(), place(corner(surface, crossings.front().first, 0))));
+                    pairs.size(), place(corner(surface, pairs.front().first, 0))));
 }
 
 struct Piece {
@@ -106,7 +107,8 @@ std::vector<Piece> pieces_of(const Surface& surface) {
 }
 
 // Pieces that enclose space must take turns: outward, a cavity inside that, a body in the cavity.
-void require_orientation(const Surface& surface, const std::string& what) {
+void require_orientation(const Surface& surface, const reconstruction::SurfaceReport& report, const std::string& what) {
+  if (report.components == 1 && (!report.closed() || report.volume_mm3 > 0)) return;
   const std::vector<Piece> pieces = pieces_of(surface);
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     if (pieces[i].open) continue;
@@ -130,12 +132,15 @@ void require_orientation(const Surface& surface, const std::string& what) {
 
 }  // namespace
 
-void require_sound(const Surface& surface, Borders borders, const std::string& what) {
+SoundSurface require_sound(const Surface& surface, Borders borders, const std::string& what) {
   require_numbers(surface, what);
   require_areas(surface, what);
-  require_manifold(surface, borders, what);
-  require_no_crossings(surface, what);
-  require_orientation(surface, what);
+  SoundSurface sound;
+  sound.report = require_manifold(surface, borders, what);
+  sound.tree = std::make_shared<const TriangleTree>(surface.points, surface.triangles);
+  require_no_crossings(surface, *sound.tree, what);
+  require_orientation(surface, sound.report, what);
+  return sound;
 }
 
 double winding_number(const Points& points, const Triangles& triangles, const Eigen::Vector3d& at) {

@@ -1,15 +1,23 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <string>
 
-#include "reconstruction/surface.h"
+#include "meshing/triangle_tree.h"
+#include "reconstruction/surface_check.h"
 
 namespace supine::meshing {
 
 enum class Borders {
   closed,  ///< there must be none
   allowed  ///< open borders are part of the surface
+};
+
+/// What the check has found out on its way, for those who go on with the surface.
+struct SoundSurface {
+  reconstruction::SurfaceReport report;
+  std::shared_ptr<const TriangleTree> tree;  ///< of its triangles
 };
 
 /// Stops every surface that meshing cannot take for what it seems, before any work is done: no triangles; a point that
@@ -19,7 +27,14 @@ enum class Borders {
 /// Points no triangle uses are no fault.
 /// @param what  names the surface in the message
 /// @throws InputError  what is wrong, how often, the first place in mm and what to do
-void require_sound(const reconstruction::Surface& surface, Borders borders, const std::string& what);
+SoundSurface require_sound(const reconstruction::Surface& surface, Borders borders, const std::string& what);
+
+/// Pairs of triangles that intersect beyond what they share, ascending: reconstruction::self_intersections(), for large
+/// surfaces. Pairs whose boxes touch are first looked at in doubles with bounds of the rounding; what these cannot
+/// clear goes to the exact predicates.
+/// @param tree  of the surface's triangles
+/// @pre  manifold
+std::vector<std::pair<int, int>> crossings(const reconstruction::Surface& surface, const TriangleTree& tree);
 
 /// How often the surface goes round a point: 1 inside a closed outward surface, 0 outside (solid angles after van
 /// Oosterom and Strackee 1983, eq. 8).

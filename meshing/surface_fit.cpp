@@ -85,8 +85,14 @@ class Equations {
 
 class Fit {
  public:
-  Fit(const FitTarget& target, const QuadPairs& pairs, const FitOptions& options, FieldMesh& coarse)
-      : target_(target), pairs_(pairs), options_(options), coarse_(coarse), points_(coarse.surface.points) {
+  Fit(const FitTarget& target, const QuadPairs& pairs, const FitOptions& options, FieldMesh& coarse,
+      std::vector<int>& nearest)
+      : target_(target),
+        pairs_(pairs),
+        options_(options),
+        coarse_(coarse),
+        points_(coarse.surface.points),
+        nearest_(nearest) {
     edges_ = reconstruction::mesh_edges(coarse.surface.triangles);
     collect_neighbours();
   }
@@ -134,7 +140,9 @@ class Fit {
   // Distances of the input's points, gathered triangle by triangle: 3×3 weights, 3 right-hand rows per metric.
   void add_samples(Equations& equations) {
     const TriangleTree tree(points_, coarse_.surface.triangles);
-    const std::vector<TriangleTree::Hit> hits = tree.closest(target_.points);
+    const std::vector<TriangleTree::Hit> hits = tree.closest(target_.points, nearest_);
+    nearest_.resize(hits.size());
+    for (std::size_t s = 0; s < hits.size(); ++s) nearest_[s] = hits[s].triangle;
     const double mean_square = mean_squared(hits);
     std::vector<std::array<Eigen::Matrix3d, 6>> blocks(coarse_.surface.triangles.rows());
     std::vector<std::array<Eigen::Vector3d, 3>> rights(blocks.size());
@@ -273,6 +281,7 @@ class Fit {
   const FitOptions& options_;
   FieldMesh& coarse_;
   Points& points_;
+  std::vector<int>& nearest_;
   Points start_;
   std::vector<MeshEdge> edges_;
   std::vector<std::vector<int>> neighbours_;  // along a chain: its two; else without diagonals of quads
@@ -283,7 +292,9 @@ class Fit {
 
 }  // namespace
 
-FitTarget::FitTarget(const Surface& input, int most_samples) : tree(input.points, input.triangles) {
+FitTarget::FitTarget(const Surface& input, int most_samples, std::shared_ptr<const TriangleTree> input_tree)
+    : tree(std::move(input_tree)) {
+  if (!tree) tree = std::make_shared<const TriangleTree>(input.points, input.triangles);
   const Points all_normals = reconstruction::point_normals(input.points, input.triangles);
   Eigen::VectorXd all_areas = Eigen::VectorXd::Zero(input.points.rows());
   for (Eigen::Index t = 0; t < input.triangles.rows(); ++t) {
@@ -326,7 +337,7 @@ void project(const FitTarget& target, Surface& surface) {
   const std::vector<char> on_border = border_points_of(surface, reconstruction::mesh_edges(surface.triangles));
 #pragma omp parallel for schedule(dynamic, 512)
   for (Eigen::Index p = 0; p < surface.points.rows(); ++p) {
-    const TriangleTree& tree = on_border[p] && target.border ? *target.border : target.tree;
+    const TriangleTree& tree = on_border[p] && target.border ? *target.border : *target.tree;
     surface.points.row(p) = tree.closest(Eigen::Vector3d(surface.points.row(p).transpose())).point.transpose();
   }
 }
@@ -346,14 +357,15 @@ void even_out(const FitTarget& target, const std::vector<Eigen::Vector3d>& place
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
       for (const int q : neighbours[p]) sum += surface.points.row(q).transpose();
       const Eigen::Vector3d middle = sum / static_cast<double>(neighbours[p].size());
-      next.row(p) = target.tree.closest(middle).point.transpose();
+      next.row(p) = target.tree->closest(middle).point.transpose();
     }
     surface.points = next;
   }
 }
 
-void fit_surface(const FitTarget& target, const QuadPairs& pairs, const FitOptions& options, FieldMesh& coarse) {
-  Fit(target, pairs, options, coarse).run();
+void fit_surface(const FitTarget& target, const QuadPairs& pairs, const FitOptions& options, FieldMesh& coarse,
+                 std::vector<int>& nearest) {
+  Fit(target, pairs, options, coarse, nearest).run();
 }
 
 }  // namespace supine::meshing

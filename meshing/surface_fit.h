@@ -12,9 +12,11 @@ namespace supine::meshing {
 /// What a coarse surface is fitted to: points of the input with normals and areas, its region borders and open borders.
 struct FitTarget {
   /// @param most_samples  about so many points of the input are used, evenly chosen
-  FitTarget(const reconstruction::Surface& input, int most_samples);
+  /// @param input_tree  of the input, where there is one already
+  FitTarget(const reconstruction::Surface& input, int most_samples,
+            std::shared_ptr<const TriangleTree> input_tree = nullptr);
 
-  TriangleTree tree;  ///< of the input
+  std::shared_ptr<const TriangleTree> tree;  ///< of the input
   Points points, normals;
   Eigen::VectorXd area_mm2;
   Points border_points, border_tangents;  ///< samples of the borders
@@ -41,6 +43,10 @@ void even_out(const FitTarget& target, const std::vector<Eigen::Vector3d>& place
 /// each round, with smoothing in the tangent plane only, so that the surface neither shrinks nor flattens. Border
 /// points stay on the borders, corners where they are. Triangles do not turn over: steps that would are shortened.
 /// @param coarse  its points are moved; sizes and normals (of the input) are used
-void fit_surface(const FitTarget& target, const QuadPairs& pairs, const FitOptions& options, FieldMesh& coarse);
+/// @param nearest  by sample of the target the triangle nearest to it, as the last fit left it; empty at first. It
+/// makes
+///   the next fit faster and changes nothing else
+void fit_surface(const FitTarget& target, const QuadPairs& pairs, const FitOptions& options, FieldMesh& coarse,
+                 std::vector<int>& nearest);
 
 }  // namespace supine::meshing

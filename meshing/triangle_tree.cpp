@@ -9,6 +9,23 @@ namespace supine::meshing {
 namespace {
 constexpr int leaf_size = 4;
 constexpr int deepest = 64;
+constexpr Eigen::Index block_size = 512;  // of points that one thread takes one after the other
+
+// Without branches: this is the hot loop.
+double squared_distance(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& at) {
+  double sum = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double away = std::max(0.0, std::max(box.min()[i] - at[i], at[i] - box.max()[i]));
+    sum += away * away;
+  }
+  return sum;
+}
+
+bool overlap(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) {
+  for (int i = 0; i < 3; ++i)
+    if (a.min()[i] > b.max()[i] || b.min()[i] > a.max()[i]) return false;
+  return true;
+}
 }  // namespace
 
 Eigen::Vector3d closest_weights(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& abc) {
@@ -55,6 +72,8 @@ TriangleTree::TriangleTree(const Points& points, const Triangles& triangles) : o
   corners_.resize(count);
   for (int i = 0; i < count; ++i)
     for (int c = 0; c < 3; ++c) corners_[i][c] = points.row(triangles(order_[i], c)).transpose();
+  place_.resize(count);
+  for (int i = 0; i < count; ++i) place_[order_[i]] = i;
 }
 
 void TriangleTree::split(int node, int first, int last, const Points& centres,
@@ -80,19 +99,27 @@ void TriangleTree::split(int node, int first, int last, const Points& centres,
   split(child + 1, half, last, centres, boxes);
 }
 
-TriangleTree::Hit TriangleTree::closest(const Eigen::Vector3d& at, double within_mm) const {
-  Hit best;
-  best.squared_mm2 = within_mm * within_mm;
+void TriangleTree::improve(int place, const Eigen::Vector3d& at, Hit& best) const {
+  const auto& abc = corners_[place];
+  const Eigen::Vector3d weights = closest_weights(at, abc);
+  const Eigen::Vector3d point = weights[0] * abc[0] + weights[1] * abc[1] + weights[2] * abc[2];
+  const double squared = (point - at).squaredNorm();
+  // Ties go to the lower number, so that the answer does not depend on the order of the walk.
+  if (squared < best.squared_mm2 || (squared == best.squared_mm2 && order_[place] < best.triangle))
+    best = {order_[place], point, weights, squared};
+}
+
+TriangleTree::Hit TriangleTree::search(const Eigen::Vector3d& at, Hit best) const {
   std::array<std::pair<int, double>, deepest> stack;
   int top = 0;
-  stack[top++] = {0, nodes_[0].box.squaredExteriorDistance(at)};
+  stack[top++] = {0, squared_distance(nodes_[0].box, at)};
   while (top > 0) {
     const auto [index, distance] = stack[--top];
     if (distance > best.squared_mm2) continue;
     const Node& node = nodes_[index];
     if (node.count == 0) {
-      double near = nodes_[node.first].box.squaredExteriorDistance(at);
-      double far = nodes_[node.first + 1].box.squaredExteriorDistance(at);
+      double near = squared_distance(nodes_[node.first].box, at);
+      double far = squared_distance(nodes_[node.first + 1].box, at);
       int first = node.first, second = node.first + 1;
       if (far < near) {
         std::swap(near, far);
@@ -102,31 +129,90 @@ TriangleTree::Hit TriangleTree::closest(const Eigen::Vector3d& at, double within
       if (near <= best.squared_mm2) stack[top++] = {first, near};
       continue;
     }
-    for (int i = node.first; i < node.first + node.count; ++i) {
-      const auto& abc = corners_[i];
-      const Eigen::Vector3d weights = closest_weights(at, abc);
-      const Eigen::Vector3d point = weights[0] * abc[0] + weights[1] * abc[1] + weights[2] * abc[2];
-      const double squared = (point - at).squaredNorm();
-      // Ties go to the lower number, so that the answer does not depend on the order of the walk.
-      if (squared < best.squared_mm2 || (squared == best.squared_mm2 && order_[i] < best.triangle))
-        best = {order_[i], point, weights, squared};
-    }
+    for (int i = node.first; i < node.first + node.count; ++i) improve(i, at, best);
   }
   return best;
 }
 
-std::vector<TriangleTree::Hit> TriangleTree::closest(const Points& at) const {
+TriangleTree::Hit TriangleTree::search_from(const Eigen::Vector3d& at, int triangle) const {
+  Hit start;
+  if (triangle >= 0) improve(place_[triangle], at, start);
+  return search(at, start);
+}
+
+TriangleTree::Hit TriangleTree::closest(const Eigen::Vector3d& at, double within_mm) const {
+  Hit start;
+  start.squared_mm2 = within_mm * within_mm;
+  return search(at, start);
+}
+
+std::vector<TriangleTree::Hit> TriangleTree::closest(const Points& at, const std::vector<int>& near) const {
   std::vector<Hit> hits(at.rows());
-#pragma omp parallel for schedule(dynamic, 512)
-  for (Eigen::Index p = 0; p < at.rows(); ++p) hits[p] = closest(Eigen::Vector3d(at.row(p)));
+#pragma omp parallel for schedule(dynamic, 1)
+  for (Eigen::Index block = 0; block < at.rows(); block += block_size)
+    for (Eigen::Index p = block; p < std::min(at.rows(), block + block_size); ++p) {
+      const int last = p > block ? hits[p - 1].triangle : -1;
+      hits[p] = search_from(at.row(p).transpose(), near.empty() ? last : near[p]);
+    }
   return hits;
 }
 
 Eigen::VectorXd TriangleTree::distances_mm(const Points& at) const {
   Eigen::VectorXd result(at.rows());
-#pragma omp parallel for schedule(dynamic, 512)
-  for (Eigen::Index p = 0; p < at.rows(); ++p) result(p) = std::sqrt(closest(Eigen::Vector3d(at.row(p))).squared_mm2);
+#pragma omp parallel for schedule(dynamic, 1)
+  for (Eigen::Index block = 0; block < at.rows(); block += block_size)
+    for (Eigen::Index p = block, last = -1; p < std::min(at.rows(), block + block_size); ++p) {
+      const Hit hit = search_from(at.row(p).transpose(), static_cast<int>(last));
+      result(p) = std::sqrt(hit.squared_mm2);
+      last = hit.triangle;
+    }
   return result;
+}
+
+Eigen::AlignedBox3d TriangleTree::box_of(int place) const {
+  const auto& [a, b, c] = corners_[place];
+  return {a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c)};
+}
+
+// Pairs of a leaf's triangles with each other and with those of later leaves.
+void TriangleTree::pairs_of_leaf(const Node& leaf, const std::function<bool(int, int)>& keep,
+                                 std::vector<std::pair<int, int>>& found) const {
+  std::array<Eigen::AlignedBox3d, leaf_size> own;
+  for (int i = 0; i < leaf.count; ++i) own[i] = box_of(leaf.first + i);
+  std::array<int, deepest> stack;
+  int top = 0;
+  stack[top++] = 0;
+  while (top > 0) {
+    const Node& node = nodes_[stack[--top]];
+    if (!overlap(node.box, leaf.box)) continue;
+    if (node.count == 0) {
+      stack[top++] = node.first;
+      stack[top++] = node.first + 1;
+      continue;
+    }
+    for (int j = std::max(node.first, leaf.first); j < node.first + node.count; ++j) {
+      const Eigen::AlignedBox3d other = box_of(j);
+      if (!overlap(leaf.box, other)) continue;
+      for (int i = 0; i < leaf.count && leaf.first + i < j; ++i)
+        if (overlap(own[i], other) && keep(order_[leaf.first + i], order_[j]))
+          found.emplace_back(std::minmax(order_[leaf.first + i], order_[j]));
+    }
+  }
+}
+
+std::vector<std::pair<int, int>> TriangleTree::pairs(const std::function<bool(int, int)>& keep) const {
+  std::vector<std::pair<int, int>> all;
+#pragma omp parallel
+  {
+    std::vector<std::pair<int, int>> found;
+#pragma omp for schedule(dynamic, block_size) nowait
+    for (std::size_t n = 0; n < nodes_.size(); ++n)
+      if (nodes_[n].count > 0) pairs_of_leaf(nodes_[n], keep, found);
+#pragma omp critical
+    all.insert(all.end(), found.begin(), found.end());
+  }
+  std::sort(all.begin(), all.end());
+  return all;
 }
 
 std::vector<int> TriangleTree::overlapping(const Eigen::AlignedBox3d& box) const {
@@ -140,11 +226,8 @@ std::vector<int> TriangleTree::overlapping(const Eigen::AlignedBox3d& box) const
       stack.push_back(node.first + 1);
       continue;
     }
-    for (int i = node.first; i < node.first + node.count; ++i) {
-      Eigen::AlignedBox3d own;
-      for (const Eigen::Vector3d& corner : corners_[i]) own.extend(corner);
-      if (own.intersects(box)) found.push_back(order_[i]);
-    }
+    for (int i = node.first; i < node.first + node.count; ++i)
+      if (box_of(i).intersects(box)) found.push_back(order_[i]);
   }
   std::sort(found.begin(), found.end());
   return found;

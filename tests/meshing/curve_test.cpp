@@ -8,6 +8,7 @@
 
 #include "common/error.h"
 #include "meshing/fine_surface.h"
+#include "meshing/grade.h"
 #include "meshing/jacobian.h"
 #include "meshing/quality.h"
 #include "meshing/tetrahedralise.h"
@@ -78,6 +79,26 @@ TEST(Curve, EveryCellKeepsTheJacobianAskedFor) {
       EXPECT_GT(report.middles_pulled_back, 0);
       EXPECT_GT(report.pulled_back_max_mm, 0);
     }
+  }
+}
+
+// Short edges where the skin ends, among long ones that bend by a good share of the short ones' length.
+TEST(Curve, MeshesGradedAtTheSkinsEdgeBendSoundly) {
+  const Surface coarse = testing::dome_surface({.rings = 5, .layers = 2});
+  const double mean_mm = meshing::mean_edge_mm(coarse);
+  for (const double share : {0.5, 0.25}) {
+    const Surface graded = meshing::refine_skin_edge(coarse, share * mean_mm);
+    ASSERT_GT(graded.triangles.rows(), 1.3 * coarse.triangles.rows());
+    TetMesh mesh = meshing::to_quadratic(meshing::tetrahedralise(graded, {.edge_mm = mean_mm}));
+    const CurveReport report = meshing::curve_boundary(mesh, fine_dome(), nullptr);
+    const auto quality = meshing::measure_quality(mesh);
+    EXPECT_GE(quality.min_scaled_jacobian, 0.3 - 1e-3) << share;
+    EXPECT_EQ(quality.inverted, 0) << share;
+    EXPECT_LT(report.skin_after.rms_mm, report.skin_before.rms_mm / 4) << share;
+    EXPECT_LT(static_cast<double>(report.corners_pulled_back + report.middles_pulled_back),
+              0.02 * static_cast<double>(report.corners + report.middles))
+        << share;
+    EXPECT_NEAR(report.volume_after_ml / report.fine_volume_ml, 1, 2e-3) << share;
   }
 }
 
