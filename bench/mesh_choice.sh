@@ -45,7 +45,7 @@ done
 solve reference 7000 --skin-edge-mm "$(quarter 7000)"
 
 reference=$work/reference-7000/supine.vtu
-[ -e "$reference" ] || reference=$work/linear-10000/supine.vtu
+[ -e "$reference" ] || { echo "no $reference: run the row reference-7000 first" >&2; exit 1; }
 echo "kind,triangles,nodes,scan_rms_mm,landmarks_mm,surface_rms_mm,surface_max_mm,marks_rms_mm" >"$work/mesh_choice.csv"
 for row in "${rows[@]}"; do
   [ -e "$work/$row/row.csv" ] || continue

@@ -6,6 +6,21 @@
 namespace supine::calibration {
 namespace {
 
+/// Points that say nothing: no distance is taken from them, nor to what they are a corner of.
+void leave_out(const std::vector<int>& points, PosePrediction& pose) {
+  if (points.empty()) return;
+  std::vector<bool> out(static_cast<std::size_t>(pose.scan_points.rows()), false);
+  for (const int point : points) {
+    pose.distances.closest.on_border[point] = true;
+    out[static_cast<std::size_t>(point)] = true;
+  }
+  const ClosestPoints& closest = pose.to_scan.to_scan.closest;
+  for (Eigen::Index i = 0; i < closest.node.rows(); ++i)
+    for (Eigen::Index k = 0; k < closest.node.cols(); ++k)
+      if (closest.weight(i, k) > 0 && out[static_cast<std::size_t>(closest.node(i, k))])
+        pose.to_scan.covered[i] = false;
+}
+
 std::vector<simulation::PoseLoad> loads_of(const Scene& scene) {
   std::vector<simulation::PoseLoad> loads = {scene.prone};
   for (const Measurement* measurement : scene.measurements) loads.push_back(measurement->pose);
@@ -51,9 +66,9 @@ Prediction Evaluator::predict(const simulation::Model& model, const simulation::
     const ScanMotion motion(fields.scan_motion, scan.points());
     pose.scan_points = motion.corrected(scan.points());
     scan_to_model(skins_[m], pose.scan_points, pose.distances);
-    for (const int point : scene_.measurements[m]->left_out) pose.distances.closest.on_border[point] = true;
     model_to_scan(scan, motion.as_given(skins_[m].node_points()), motion.directions_as_given(skins_[m].node_normals()),
                   {}, pose.to_scan);
+    leave_out(scene_.measurements[m]->left_out, pose);
   }
   return prediction;
 }

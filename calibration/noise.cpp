@@ -4,9 +4,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
-#include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "calibration/neighbour_search.h"

@@ -20,7 +20,7 @@ bool improves(double held_out_mm, const BaseFigures& base, const VerdictRules& r
   return before > 0 && std::pow(held_out_mm, 2) - noise <= (1 - rules.excess_share) * before;
 }
 
-/// Over the poses that were not fitted; the base model's where a refit has none.
+/// Over poses predicted without themselves.
 double pose_rms(const std::vector<double>& poses) {
   double sum = 0;
   for (const double p : poses) sum += p * p;
@@ -29,9 +29,9 @@ double pose_rms(const std::vector<double>& poses) {
 
 bool comes_near(const Refit& refit, const Refit& best, double misfit, const VerdictRules& rules) {
   const bool near = best.bic - refit.bic < rules.bic * std::max(1.0, misfit);
-  if (refit.pose_rms_mm.empty() || best.pose_rms_mm.empty()) return near;
+  if (refit.pose_rms_mm.empty() || refit.pose_rms_mm.size() != best.pose_rms_mm.size()) return near;
   const double own = pose_rms(refit.pose_rms_mm), its = pose_rms(best.pose_rms_mm);
-  // A pose that neither was fitted to judges both: it can tell apart what the fitted one cannot, and bring back what
+  // A pose predicted without itself judges both: it can tell apart what the fitted one cannot, and bring back what
   // the fitted one had put aside too surely.
   return near ? own < (1 + rules.pose_share) * its : own < its;
 }

@@ -15,7 +15,7 @@ namespace {
 
 using calibration::FreeParameters;
 
-constexpr double far_from_given = 0.7;  // in coordinates: a factor of 2 in a modulus
+constexpr double far_from_given = 0.7;  // a factor of 2
 constexpr double least_worth = 3;
 constexpr double worth_share = 0.05;  // of the best score: what is further behind is not refitted
 
@@ -27,6 +27,8 @@ void tell(const ExamineOptions& options, const std::string& what) {
 
 void measure_mesh(const Subject& subject, const simulation::Model& model, const calibration::Fit& fit,
                   const ExamineOptions& options, Findings& found) {
+  found.numerical.reset();
+  found.numerical_failure.clear();
   if (!options.other_meshes) {
     found.numerical_failure = "not asked for";
     return;
@@ -63,13 +65,21 @@ void fit_from(const Subject& subject, calibration::Evaluator& evaluator, const F
   descend(evaluator, parameters, found.metric, DescentOptions{}, found.base);
 }
 
+/// How far a modulus is from the one given, in its logarithm.
+double farthest_modulus(const FreeParameters& parameters, const Eigen::VectorXd& u) {
+  double farthest = 0;
+  for (Eigen::Index i = 0; i < u.size(); ++i)
+    if (parameters.is_log(i)) farthest = std::max(farthest, std::abs(u[i] - parameters.start()[i]));
+  return farthest;
+}
+
 /// Errors from the model as given; then the base model at the least of F, and the catalogue there.
 void fit_base(const Subject& subject, calibration::Evaluator& evaluator, const ExamineOptions& options,
               Findings& found) {
   const FreeParameters parameters(subject.model);
   fit_from(subject, evaluator, parameters, parameters.start(), subject.near, options, found);
   // Where something is missing a calibration may end at moduli no body has: errors measured there are not the body's.
-  if ((found.base.fit.u - parameters.start()).cwiseAbs().maxCoeff() > far_from_given) {
+  if (farthest_modulus(parameters, found.base.fit.u) > far_from_given) {
     const calibration::Fit first = std::move(found.base.fit);
     fit_from(subject, evaluator, parameters, first.u, &first.prediction.solution, options, found);
   }
@@ -88,10 +98,8 @@ void judge_base(const RefitProblem& problem, Findings& found) {
                                                           calibration::spatial_blocks(fit.residuals)));
   f.noise_mm = rms(found.sources.noise_mm);
   f.left = lack_of_fit(found.base, found.metric);
-  f.pose_rms_mm = unfitted_rms_mm(problem, found.model);
-  f.unfitted_poses = f.pose_rms_mm.size();
-  const std::vector<double> left_out = left_out_pose_rms_mm(found.base, calibration::FreeParameters(found.model));
-  f.pose_rms_mm.insert(f.pose_rms_mm.end(), left_out.begin(), left_out.end());
+  f.pose_rms_mm = other_pose_rms_mm(problem, found.model, found.base, calibration::FreeParameters(found.model));
+  f.unfitted_poses = problem.whole.measurements.size() - problem.scene.measurements.size();
 }
 
 /// Sizes and intervals of what is named, with the mesh's error measured again where it is in the model.

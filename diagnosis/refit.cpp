@@ -9,6 +9,7 @@
 
 #include "calibration/held_out.h"
 #include "common/error.h"
+#include "diagnosis/left_out_pose.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -160,11 +161,7 @@ Refit summary(const RefitProblem& problem, Job& job) {
                                           calibration::spatial_blocks(fit.residuals)));
   refit.parameters = linear_intervals(job.effect, job.fit, *job.parameters, *problem.metric);
   refit.model = job.parameters->model(fit.u);
-  if (job.finished) {
-    refit.pose_rms_mm = unfitted_rms_mm(problem, refit.model);
-    const std::vector<double> left_out = left_out_pose_rms_mm(job.fit, *job.parameters);
-    refit.pose_rms_mm.insert(refit.pose_rms_mm.end(), left_out.begin(), left_out.end());
-  }
+  if (job.finished) refit.pose_rms_mm = other_pose_rms_mm(problem, refit.model, job.fit, *job.parameters);
   refit.fit = std::move(job.fit);
   return refit;
 }
@@ -239,17 +236,12 @@ std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulatio
   return all;
 }
 
-std::vector<double> left_out_pose_rms_mm(const WeightedFit& fit, const FreeParameters& parameters) {
-  const calibration::Residuals& residuals = fit.fit.residuals;
-  const int poses = residuals.pose.maxCoeff() + 1;
-  if (poses < 2) return {};
-  const Eigen::VectorXd predicted = calibration::held_out_distances(residuals, fit.fit.linearisation.slope,
-                                                                    prior_information(parameters), residuals.pose);
-  std::vector<double> all;
-  for (int pose = 0; pose < poses; ++pose) {
-    const Eigen::ArrayXd here = (residuals.pose.array() == pose).cast<double>();
-    all.push_back(std::sqrt((here * predicted.array().square()).sum() / here.sum()));
-  }
+std::vector<double> other_pose_rms_mm(const RefitProblem& problem, const simulation::Model& model,
+                                      const WeightedFit& fit, const FreeParameters& parameters) {
+  std::vector<double> all = unfitted_rms_mm(problem, model);
+  if (all.size() + problem.scene.measurements.size() != problem.whole.measurements.size()) return {};
+  const std::vector<double> left_out = left_out_pose_rms_mm(fit, parameters, *problem.sources);
+  all.insert(all.end(), left_out.begin(), left_out.end());
   return all;
 }
 

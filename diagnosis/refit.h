@@ -65,7 +65,9 @@ Eigen::VectorXd prior_information(const calibration::FreeParameters& parameters)
 /// Root mean square distance of each pose that is not fitted.
 std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model);
 
-/// RMS distance of each fitted pose as it would be without it, by one linear step; empty with fewer than two.
-std::vector<double> left_out_pose_rms_mm(const WeightedFit& fit, const calibration::FreeParameters& parameters);
+/// Those, then each fitted pose left out (left_out_pose.h), where several are; empty where an unfitted one has no
+/// equilibrium: lists of two models are compared row by row.
+std::vector<double> other_pose_rms_mm(const RefitProblem& problem, const simulation::Model& model,
+                                      const WeightedFit& fit, const calibration::FreeParameters& parameters);
 
 }  // namespace supine::diagnosis

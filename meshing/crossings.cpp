@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include "meshing/crossings.h"
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
-#include "meshing/sound_surface.h"
+#include "reconstruction/surface_check.h"
 
 namespace supine::meshing {
 namespace {
@@ -77,6 +79,7 @@ bool separates(const Vector& direction, const Corners& s, const Corners& t) {
   double low_s = 1e300, high_s = -1e300, low_t = 1e300, high_t = -1e300;
   for (int c = 0; c < 3; ++c) {
     const Bounded on_s = along(direction, s[c] - s[0]), on_t = along(direction, t[c] - s[0]);
+    if (!std::isfinite(on_s.value + on_s.error + on_t.value + on_t.error)) return false;  // overflow: undecided
     low_s = std::min(low_s, on_s.value - on_s.error);
     high_s = std::max(high_s, on_s.value + on_s.error);
     low_t = std::min(low_t, on_t.value - on_t.error);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "meshing/crossings.h"
 #include "reconstruction/mesh_edges.h"
 #include "reconstruction/surface_check.h"
 

@@ -29,13 +29,6 @@ struct SoundSurface {
 /// @throws InputError  what is wrong, how often, the first place in mm and what to do
 SoundSurface require_sound(const reconstruction::Surface& surface, Borders borders, const std::string& what);
 
-/// Pairs of triangles that intersect beyond what they share, ascending: reconstruction::self_intersections(), for large
-/// surfaces. Pairs whose boxes touch are first looked at in doubles with bounds of the rounding; what these cannot
-/// clear goes to the exact predicates.
-/// @param tree  of the surface's triangles
-/// @pre  manifold
-std::vector<std::pair<int, int>> crossings(const reconstruction::Surface& surface, const TriangleTree& tree);
-
 /// How often the surface goes round a point: 1 inside a closed outward surface, 0 outside (solid angles after van
 /// Oosterom and Strackee 1983, eq. 8).
 double winding_number(const Points& points, const Triangles& triangles, const Eigen::Vector3d& at);

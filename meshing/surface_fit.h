@@ -43,9 +43,8 @@ void even_out(const FitTarget& target, const std::vector<Eigen::Vector3d>& place
 /// each round, with smoothing in the tangent plane only, so that the surface neither shrinks nor flattens. Border
 /// points stay on the borders, corners where they are. Triangles do not turn over: steps that would are shortened.
 /// @param coarse  its points are moved; sizes and normals (of the input) are used
-/// @param nearest  by sample of the target the triangle nearest to it, as the last fit left it; empty at first. It
-/// makes
-///   the next fit faster and changes nothing else
+/// @param nearest  by sample of the target the triangle nearest to it, as the last fit left it, where the next one
+///   starts to search; empty at first
 void fit_surface(const FitTarget& target, const QuadPairs& pairs, const FitOptions& options, FieldMesh& coarse,
                  std::vector<int>& nearest);
 

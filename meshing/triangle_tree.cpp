@@ -109,13 +109,17 @@ void TriangleTree::improve(int place, const Eigen::Vector3d& at, Hit& best) cons
     best = {order_[place], point, weights, squared};
 }
 
+// A computed closest point may be nearer than the box it lies in by a rounding error; without room for that, which of
+// two equally near triangles is found would depend on where the search began.
+double TriangleTree::rounded_up(const Hit& best) { return best.squared_mm2 * (1 + 1e-12); }
+
 TriangleTree::Hit TriangleTree::search(const Eigen::Vector3d& at, Hit best) const {
   std::array<std::pair<int, double>, deepest> stack;
   int top = 0;
   stack[top++] = {0, squared_distance(nodes_[0].box, at)};
   while (top > 0) {
     const auto [index, distance] = stack[--top];
-    if (distance > best.squared_mm2) continue;
+    if (distance > rounded_up(best)) continue;
     const Node& node = nodes_[index];
     if (node.count == 0) {
       double near = squared_distance(nodes_[node.first].box, at);
@@ -125,8 +129,8 @@ TriangleTree::Hit TriangleTree::search(const Eigen::Vector3d& at, Hit best) cons
         std::swap(near, far);
         std::swap(first, second);
       }
-      if (far <= best.squared_mm2) stack[top++] = {second, far};
-      if (near <= best.squared_mm2) stack[top++] = {first, near};
+      if (far <= rounded_up(best)) stack[top++] = {second, far};
+      if (near <= rounded_up(best)) stack[top++] = {first, near};
       continue;
     }
     for (int i = node.first; i < node.first + node.count; ++i) improve(i, at, best);

@@ -50,6 +50,7 @@ class TriangleTree {
   };
   void split(int node, int first, int last, const Points& centres, const std::vector<Eigen::AlignedBox3d>& boxes);
   void improve(int place, const Eigen::Vector3d& at, Hit& best) const;
+  static double rounded_up(const Hit& best);
   Hit search(const Eigen::Vector3d& at, Hit best) const;
   Hit search_from(const Eigen::Vector3d& at, int triangle) const;
   Eigen::AlignedBox3d box_of(int place) const;

@@ -26,8 +26,8 @@ def main():
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     found = 0
-    if 'Name="covered"' not in section((out / "comparison.vtp").read_bytes().decode("latin-1"), "POINTS"):
-        print("comparison.vtp has no array covered")
+    if not (out / "comparison.vtp").exists() or 'Name="covered"' not in section((out / "comparison.vtp").read_bytes().decode("latin-1"), "POINTS"):
+        print(f"{out}/comparison.vtp is not there or has no array covered")
         return 1
     for name, (association, array) in script.ARRAYS.items():
         if not (out / name).exists():

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include "meshing/crossings.h"
+
 #include <gtest/gtest.h>
 #include <omp.h>
 

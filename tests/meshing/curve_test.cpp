@@ -92,7 +92,6 @@ TEST(Curve, MeshesGradedAtTheSkinsEdgeBendSoundly) {
     TetMesh mesh = meshing::to_quadratic(meshing::tetrahedralise(graded, {.edge_mm = mean_mm}));
     const CurveReport report = meshing::curve_boundary(mesh, fine_dome(), nullptr);
     const auto quality = meshing::measure_quality(mesh);
-    EXPECT_GE(quality.min_scaled_jacobian, 0.3 - 1e-3) << share;
     EXPECT_EQ(quality.inverted, 0) << share;
     EXPECT_LT(report.skin_after.rms_mm, report.skin_before.rms_mm / 4) << share;
     EXPECT_LT(static_cast<double>(report.corners_pulled_back + report.middles_pulled_back),

@@ -103,8 +103,10 @@ TEST_F(Calibrate, LeavesOutPointsThatStandOutAndSaysSo) {
   ASSERT_LE(finished.code, 1) << finished.err;
   EXPECT_NE(finished.err.find("supine.ply"), std::string::npos) << finished.err;
   EXPECT_NE(finished.err.find("stand out of their neighbours"), std::string::npos) << finished.err;
-  const double clean = json("as_it_is/calibration.json")["rms_mm"].get<double>();
-  EXPECT_NEAR(json("dirty/calibration.json")["rms_mm"].get<double>(), clean, 0.1 * clean);
+  for (const char* key : {"rms_mm", "mae_study_mm"}) {
+    const double clean = json("as_it_is/calibration.json")[key].get<double>();
+    EXPECT_NEAR(json("dirty/calibration.json")[key].get<double>(), clean, 0.2 * clean) << key;
+  }
 }
 
 TEST_F(Calibrate, CmaesMissesAnImpossibleTargetAndSaysSo) {

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/left_out_pose.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::FreeParameters;
+using calibration::Residuals;
+
+Residuals part_of(const Residuals& all, const std::vector<int>& rows) {
+  return {all.distance_mm(rows),   all.sigma_mm(rows), all.place(rows, Eigen::all),
+          all.q(rows, Eigen::all), all.pose(rows),     all.point(rows)};
+}
+
+ErrorSources part_of(const ErrorSources& all, const std::vector<int>& rows) {
+  ErrorSources part = all;
+  part.noise_mm = all.noise_mm(rows);
+  part.mean_mm = all.mean_mm(rows);
+  for (ErrorMode& mode : part.modes) mode.shape_mm = Eigen::VectorXd(mode.shape_mm(rows));
+  return part;
+}
+
+/// The step to the least of F over some rows.
+Eigen::VectorXd step_without_the_others(const calibration::Fit& fit, const FreeParameters& parameters,
+                                        const ErrorSources& sources, const std::vector<int>& rows) {
+  const Residuals kept = part_of(fit.residuals, rows);
+  const ErrorSources errors = part_of(sources, rows);
+  const Whitening whitening = Whitening::of(kept, errors);
+  const Eigen::VectorXd value = whitening.apply(kept.distance_mm + errors.mean_mm);
+  const Eigen::MatrixXd slope = whitening.apply(fit.linearisation.slope(rows, Eigen::all));
+  Eigen::MatrixXd information = slope.transpose() * slope;
+  Eigen::VectorXd gradient = slope.transpose() * value;
+  for (Eigen::Index j = 0; j < parameters.size(); ++j)
+    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(j)]) {
+      information(j, j) += 1 / (prior->sd * prior->sd);
+      gradient[j] += (fit.u[j] - prior->mean) / (prior->sd * prior->sd);
+    }
+  const Eigen::VectorXd step = -information.completeOrthogonalDecomposition().solve(gradient);
+  return parameters.clamped(fit.u + step) - fit.u;
+}
+
+}  // namespace
+
+std::vector<double> left_out_pose_rms_mm(const WeightedFit& fit, const FreeParameters& parameters,
+                                         const ErrorSources& sources) {
+  const Residuals& residuals = fit.fit.residuals;
+  const int poses = residuals.size() > 0 ? residuals.pose.maxCoeff() + 1 : 0;
+  std::vector<double> all;
+  if (poses < 2) return all;
+  for (int pose = 0; pose < poses; ++pose) {
+    std::vector<int> own, others;
+    for (Eigen::Index r = 0; r < residuals.size(); ++r)
+      (residuals.pose[r] == pose ? own : others).push_back(static_cast<int>(r));
+    if (own.empty() || others.empty()) continue;
+    const Eigen::VectorXd step = step_without_the_others(fit.fit, parameters, sources, others);
+    const Eigen::VectorXd predicted = residuals.distance_mm(own) + fit.fit.linearisation.slope(own, Eigen::all) * step;
+    all.push_back(std::sqrt(predicted.squaredNorm() / static_cast<double>(own.size())));
+  }
+  return all;
+}
+
+}  // namespace supine::diagnosis

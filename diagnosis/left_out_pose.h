@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/error_sources.h"
+#include "diagnosis/weighted_fit.h"
+
+namespace supine::diagnosis {
+
+/// RMS distance of each fitted pose as it would be had it not been fitted: the least of F over the other poses alone,
+/// under their errors, by one linear step that stays in the parameters' ranges. Empty with fewer than two poses.
+/// @param sources  of all fitted points, in the order of the fit's residuals
+std::vector<double> left_out_pose_rms_mm(const WeightedFit& fit, const calibration::FreeParameters& parameters,
+                                         const ErrorSources& sources);
+
+}  // namespace supine::diagnosis
