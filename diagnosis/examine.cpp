@@ -99,7 +99,7 @@ void judge_base(const RefitProblem& problem, Findings& found) {
   f.noise_mm = rms(found.sources.noise_mm);
   f.left = lack_of_fit(found.base, found.metric);
   f.pose_rms_mm = other_pose_rms_mm(problem, found.model, found.base, calibration::FreeParameters(found.model));
-  f.unfitted_poses = problem.whole.measurements.size() - problem.scene.measurements.size();
+  f.unfitted_poses = comparable_poses(problem);
 }
 
 /// Sizes and intervals of what is named, with the mesh's error measured again where it is in the model.

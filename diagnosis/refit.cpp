@@ -236,10 +236,20 @@ std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulatio
   return all;
 }
 
+std::size_t comparable_poses(const RefitProblem& problem) {
+  const auto& effects = problem.model->effects;
+  const bool elsewhere =
+      std::any_of(effects.begin(), effects.end(), [](const auto& effect) { return effect.name == "misregistration"; });
+  return elsewhere ? 0 : problem.whole.measurements.size() - problem.scene.measurements.size();
+}
+
 std::vector<double> other_pose_rms_mm(const RefitProblem& problem, const simulation::Model& model,
                                       const WeightedFit& fit, const FreeParameters& parameters) {
-  std::vector<double> all = unfitted_rms_mm(problem, model);
-  if (all.size() + problem.scene.measurements.size() != problem.whole.measurements.size()) return {};
+  std::vector<double> all;
+  if (const std::size_t unfitted = comparable_poses(problem); unfitted > 0) {
+    all = unfitted_rms_mm(problem, model);
+    if (all.size() != unfitted) return {};
+  }
   const std::vector<double> left_out = left_out_pose_rms_mm(fit, parameters, *problem.sources);
   all.insert(all.end(), left_out.begin(), left_out.end());
   return all;

@@ -65,8 +65,12 @@ Eigen::VectorXd prior_information(const calibration::FreeParameters& parameters)
 /// Root mean square distance of each pose that is not fitted.
 std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model);
 
-/// Those, then each fitted pose left out (left_out_pose.h), where several are; empty where an unfitted one has no
-/// equilibrium: lists of two models are compared row by row.
+/// How many unfitted poses a model can be judged by: none where the base model says that the fitted scan lies
+/// elsewhere, because another scan lies elsewhere in its own way.
+std::size_t comparable_poses(const RefitProblem& problem);
+
+/// RMS of these, then of each fitted pose left out (left_out_pose.h), where several are; empty where an unfitted one
+/// has no equilibrium: lists of two models are compared row by row.
 std::vector<double> other_pose_rms_mm(const RefitProblem& problem, const simulation::Model& model,
                                       const WeightedFit& fit, const calibration::FreeParameters& parameters);
 
