@@ -32,6 +32,7 @@ class TriangleTree {
   /// One hit per row, on all threads; the result does not depend on their number.
   /// @param near  by row a triangle that is likely near, −1 where none is known: searches start from its distance.
   ///   Empty: rows are taken to follow each other in space
+  /// @pre  near is empty or has a row of the triangles, or −1, for each point
   std::vector<Hit> closest(const Points& at, const std::vector<int>& near = {}) const;
 
   /// Distances alone, mm.
