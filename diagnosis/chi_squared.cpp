@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/chi_squared.h"
 
+#include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/complement.hpp>
 #include <boost/math/distributions/non_central_chi_squared.hpp>
@@ -15,13 +16,12 @@ double chi_squared_above(int freedom, double value) {
   return boost::math::cdf(complement(chi_squared(freedom), value));
 }
 
-double chi_squared_power(int freedom, double lambda, double level) {
-  if (freedom < 1) return level;
-  const double quantile = boost::math::quantile(complement(chi_squared(freedom), level));
-  if (lambda <= 0) return level;
+double chi_squared_power(int freedom, double lambda, double value) {
+  if (freedom < 1) return 0;
+  if (lambda <= 0) return chi_squared_above(freedom, value);
   constexpr double certain = 1e4;  // beyond it the series needs many terms and the chance is 1 to every digit
-  if (lambda > certain) return 1;
-  return boost::math::cdf(complement(boost::math::non_central_chi_squared(freedom, lambda), quantile));
+  if (lambda > certain + value) return 1;
+  return boost::math::cdf(complement(boost::math::non_central_chi_squared(freedom, lambda), std::max(0.0, value)));
 }
 
 }  // namespace supine::diagnosis

@@ -67,13 +67,13 @@ bool is_sure(const Refit& refit, const ScoreTable& table, const BaseFigures& bas
   const std::optional<double> fall = pose_fall(refit, base);
   if (!fall) return refit.bic >= rules.bic;
   return refit.bic >= rules.pose_bic &&
-         *fall >= (refit.bic >= rules.strong_bic ? rules.strong_pose_excess_share : rules.pose_excess_share);
+         *fall >= (refit.bic < rules.bic ? rules.weak_excess_share : rules.pose_excess_share);
 }
 
-/// Whether skin that was not fitted shows it: blocks of the fitted scan fall, and no other pose rises.
+/// Whether skin that was not fitted shows it: blocks of the fitted scan, and another pose where there is one.
 bool is_confirmed(const Refit& refit, const BaseFigures& base, const VerdictRules& rules) {
   return refit.bic >= rules.bic && improves(refit.held_out_rms_mm, base, rules) &&
-         pose_fall(refit, base).value_or(0) >= -rules.pose_excess_share;
+         pose_fall(refit, base).value_or(1) >= rules.pose_excess_share;
 }
 
 /// What counts, best first, and what comes near the best of it whether it would count by itself or not.
@@ -178,11 +178,16 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
   result.left = left[static_cast<std::size_t>(&best - refits.data())];
   for (const Refit* refit : good)
     if (refit == &best || comes_near(*refit, best, result.left.misfit, rules)) result.missing.push_back(refit->effect);
-  if (real(result.left)) {
+  const double fall = base.unfitted_poses > 0 ? pose_fall(best, base).value_or(1) : 1;
+  const bool elsewhere_too = fall >= rules.excess_share || result.left.p_value >= rules.lack_of_fit_p;
+  if (real(result.left) || !elsewhere_too) {
     result.verdict = Verdict::unexplained;
     result.missing = {best.effect};
     result.why = fmt::format("best of the catalogue, but it leaves {:.1f} times what errors would (p {:.2g})",
                              result.left.misfit, result.left.p_value);
+    if (!elsewhere_too)
+      result.why +=
+          fmt::format(" and takes away {:.0f} % of what scans that were not fitted have above noise", 100 * fall);
     return result;
   }
   std::stable_partition(result.missing.begin(), result.missing.end(), is_measurement_effect);

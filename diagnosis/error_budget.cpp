@@ -10,25 +10,39 @@ namespace {
 
 double mean_square(const Eigen::VectorXd& x) { return x.squaredNorm() / static_cast<double>(x.size()); }
 
-/// What an ordinary refit of the parameters leaves of a field.
-Eigen::VectorXd left_of(const Eigen::VectorXd& field, const Eigen::MatrixXd& slope) {
-  return field - slope * slope.completeOrthogonalDecomposition().solve(field);
-}
+/// What the fit under all errors leaves of a field.
+class LeftByFit {
+ public:
+  LeftByFit(const Eigen::MatrixXd& slope, const Whitening& whitening)
+      : slope_(slope), white_(whitening.apply(slope)), whitening_(whitening) {
+    covariance_ = (white_.transpose() * white_).completeOrthogonalDecomposition().pseudoInverse();
+  }
+
+  double mean_square_of(const Eigen::VectorXd& field) const {
+    return mean_square(field - slope_ * (covariance_ * (white_.transpose() * whitening_.apply(field))));
+  }
+
+  const Eigen::MatrixXd& covariance() const { return covariance_; }
+
+ private:
+  const Eigen::MatrixXd& slope_;
+  Eigen::MatrixXd white_, covariance_;
+  const Whitening& whitening_;
+};
 
 }  // namespace
 
 ErrorBudget error_budget(const WeightedFit& fit, const ErrorSources& sources, const Metric& metric) {
   const calibration::Fit& f = fit.fit;
   const Eigen::MatrixXd& slope = f.linearisation.slope;
+  const LeftByFit left(slope, *metric.whitening);
   const double total = mean_square(f.residuals.distance_mm);
-  double noise = mean_square(sources.noise_mm), registration = 0, numerical = std::pow(sources.spread_mm, 2);
-  numerical += mean_square(left_of(sources.mean_mm, slope));
+  double noise = mean_square(sources.noise_mm), registration = 0;
+  double numerical = std::pow(sources.spread_mm, 2) + mean_square(sources.mean_mm);
   for (const ErrorMode& mode : sources.modes)
     (mode.source == "numerical" || mode.source == "mesh" ? numerical : registration) +=
-        mean_square(left_of(mode.shape_mm, slope));
-  const Eigen::MatrixXd white = metric.whitening->apply(slope);
-  const Eigen::MatrixXd covariance = (white.transpose() * white).completeOrthogonalDecomposition().pseudoInverse();
-  double parameters = (slope * covariance).cwiseProduct(slope).sum() / static_cast<double>(slope.rows());
+        left.mean_square_of(mode.shape_mm);
+  double parameters = (slope * left.covariance()).cwiseProduct(slope).sum() / static_cast<double>(slope.rows());
   noise = std::min(noise, total);
   const double known = registration + numerical + parameters, share = std::min(1.0, (total - noise) / known);
   if (known > 0) registration *= share, numerical *= share, parameters *= share;

@@ -10,7 +10,6 @@
 #include "calibration/model_skin.h"
 #include "calibration/scan_motion.h"
 #include "common/error.h"
-#include "diagnosis/chi_squared.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -191,20 +190,34 @@ void rate_pairs(const Findings& found, const std::vector<const Candidate*>& effe
   if (in_set < 2) result.separation = 0;
 }
 
-void rate_unseen(const std::vector<const Candidate*>& effects, std::size_t from, const Slopes& now, const Slopes& then,
-                 Separation& result) {
+/// λ along the slopes, at the usual size.
+double noncentrality(const Candidate& effect, const Eigen::MatrixXd& columns) {
+  double lambda = 0;
+  for (Eigen::Index k = 0; k < columns.cols(); ++k)
+    lambda += columns.col(k).squaredNorm() * std::pow(effect.parameters[static_cast<std::size_t>(k)].typical, 2) /
+              static_cast<double>(columns.cols());
+  return lambda;
+}
+
+/// λ now over λ along the slopes now: how much less than its slope promises the effect does at its usual size.
+double shrinkage(const Findings& found, const Candidate& effect, const Slopes& now, const Eigen::MatrixXd& columns) {
+  const double along =
+      noncentrality(effect, columns - now.base * now.base.completeOrthogonalDecomposition().solve(columns));
+  for (const Score& score : found.table.scores)
+    if (score.effect == effect.effect && along > 0) return score.noncentrality / along;
+  return 1;
+}
+
+void rate_unseen(const Findings& found, const std::vector<const Candidate*>& effects, std::size_t from,
+                 const Slopes& now, const Slopes& then, Separation& result) {
   const Eigen::MatrixXd base = stacked(now.base, then.base);
   const auto solver = base.completeOrthogonalDecomposition();
   double best = seen_power, sum = 0;
   for (std::size_t e = from; e < effects.size(); ++e) {
     Eigen::MatrixXd columns = stacked(now.effect[e], then.effect[e]);
     columns -= base * solver.solve(columns);
-    double lambda = 0;
-    for (Eigen::Index k = 0; k < columns.cols(); ++k)
-      lambda += columns.col(k).squaredNorm() *
-                std::pow(effects[e]->parameters[static_cast<std::size_t>(k)].typical, 2) /
-                static_cast<double>(columns.cols());
-    const double power = chi_squared_power(static_cast<int>(columns.cols()), lambda);
+    const double lambda = shrinkage(found, *effects[e], now, now.effect[e]) * noncentrality(*effects[e], columns);
+    const double power = power_of(found.table, static_cast<int>(columns.cols()), lambda);
     sum += power;
     if (power > best) best = power, result.shows = effects[e]->effect;
   }
@@ -242,7 +255,7 @@ std::vector<Separation> next_measurements(const Subject& subject, const Findings
       const Slopes then = further(subject, found, options[o], effects, now);
       rated[o].measurement = options[o].name;
       rate_pairs(found, effects, in_set, now, then, rated[o]);
-      rate_unseen(effects, in_set, now, then, rated[o]);
+      rate_unseen(found, effects, in_set, now, then, rated[o]);
     } catch (const NumericalFailure&) {
       rated[o].measurement.clear();  // no equilibrium in that pose: nothing can be promised
     }

@@ -8,7 +8,9 @@
 #include <tuple>
 #include <vector>
 
+#include "meshing/curve.h"
 #include "meshing/decimate.h"
+#include "meshing/face_pieces.h"
 #include "meshing/grade.h"
 #include "meshing/ligament_ring.h"
 #include "meshing/tetrahedralise.h"
@@ -107,7 +109,12 @@ TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const Tet
     other.tissue[c] = mesh.tissue[from];
     other.fraction.row(c) = mesh.fraction.row(from);
   }
-  if (mesh.order() == 2) other = meshing::to_quadratic(other);
+  if (mesh.order() == 2) {
+    other = meshing::to_quadratic(other);
+    meshing::CurveOptions onto_its_faces;
+    onto_its_faces.smooth_share = 0;  // no voxels' noise in them
+    meshing::curve_boundary(other, meshing::face_pieces(mesh), nullptr, onto_its_faces);
+  }
   meshing::mark_ligament_ring(other, anatomy);
   return other;
 }
@@ -117,7 +124,9 @@ TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const Tet
 TetMesh other_mesh(const TetMesh& mesh, const meshing::Anatomy& anatomy, double skin_edge_share) {
   const reconstruction::Surface surface = boundary_of(mesh);
   const double edge_mm = meshing::mean_edge_mm(surface);
-  return filled(meshing::refine_skin_edge(surface, skin_edge_share * edge_mm), edge_mm, mesh, anatomy);
+  const double now_mm = meshing::skin_edge_mm(surface);  // shorter than the others where they were made so before
+  const double wanted_mm = skin_edge_share * (now_mm > 0 ? std::min(edge_mm, now_mm) : edge_mm);
+  return filled(meshing::refine_skin_edge(surface, wanted_mm), edge_mm, mesh, anatomy);
 }
 
 TetMesh coarser_mesh(const TetMesh& mesh, const meshing::Anatomy& anatomy, double triangle_share) {

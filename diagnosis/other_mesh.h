@@ -11,8 +11,8 @@ namespace supine::diagnosis {
 ///
 /// The skin's end on the cut face is refined (meshing::refine_skin_edge), where most of the error of linear tetrahedra
 /// comes from (docs/verification.md); the inside is filled anew, tissue fractions are those of the nearest cell of
-/// @p mesh. Of the same order as @p mesh; quadratic ones have straight edges.
-/// @param skin_edge_share  edge at the skin's end over the mean edge of the surface, in (0, 1)
+/// @p mesh. Of the same order as @p mesh; quadratic ones are bent onto its boundary.
+/// @param skin_edge_share  edge at the skin's end over what it is in @p mesh (the mean edge at the most), in (0, 1)
 /// @throws InputError  when the boundary of @p mesh cannot be filled anew
 meshing::TetMesh other_mesh(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, double skin_edge_share);
 

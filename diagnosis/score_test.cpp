@@ -17,6 +17,7 @@ using calibration::Residuals;
 constexpr double same_direction = 0.9;
 constexpr double implausible = 3;
 constexpr int null_draws = 1000;
+constexpr double chance = 0.05;
 
 double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
 
@@ -32,6 +33,7 @@ struct Projected {
   Eigen::MatrixXd slope;      // M S̃
   Eigen::MatrixXd direction;  // orthonormal
   Eigen::VectorXd secant;     // of length 1; empty where there is none
+  double secant_square;       // of the length it had
   bool one_sided;
 };
 
@@ -49,8 +51,12 @@ class Scorer {
     };
     distance_ = freed(whitening.apply(residuals.distance_mm));
     for (const Candidate& candidate : candidates) {
-      Projected p{freed(whitening.apply(candidate.slope)), {}, {}, false};
-      if (candidate.secant.size() > 0) p.secant = freed(whitening.apply(candidate.secant)).normalized();
+      Projected p{freed(whitening.apply(candidate.slope)), {}, {}, 0, false};
+      if (candidate.secant.size() > 0) {
+        p.secant = freed(whitening.apply(candidate.secant));
+        p.secant_square = p.secant.squaredNorm();
+        p.secant.normalize();
+      }
       p.direction = basis(p.slope);
       p.one_sided = candidate.parameters.size() == 1 && candidate.parameters[0].one_sided;
       projected_.push_back(std::move(p));
@@ -79,7 +85,7 @@ class Scorer {
     score.statistic = std::max(score.slope_statistic, statistic_along_secant(p, distance_));
     score.bic = score.statistic - score.freedom * log_points_;
     predict(candidate, score);
-    expect(candidate, p, score);
+    score.noncentrality = expected(candidate, p);
     return score;
   }
 
@@ -148,12 +154,14 @@ class Scorer {
     score.predicted_held_out_rms_mm = held_out_rms(d, both);
   }
 
-  void expect(const Candidate& candidate, const Projected& p, Score& score) const {
+  /// T at the typical size. Many effects grow slower than their slope at the null: where the catalogue's size was
+  /// solved, what it changes counts.
+  static double expected(const Candidate& candidate, const Projected& p) {
+    if (p.secant.size() > 0) return p.secant_square;
     double sum = 0;
     for (Eigen::Index k = 0; k < p.slope.cols(); ++k)
       sum += p.slope.col(k).squaredNorm() * std::pow(candidate.parameters[static_cast<std::size_t>(k)].typical, 2);
-    score.noncentrality = sum / static_cast<double>(p.slope.cols());
-    score.power = chi_squared_power(score.freedom, score.noncentrality);
+    return sum / static_cast<double>(p.slope.cols());
   }
 
   const Residuals& residuals_;
@@ -167,6 +175,10 @@ class Scorer {
 
 }  // namespace
 
+double power_of(const ScoreTable& table, int freedom, double noncentrality) {
+  return chi_squared_power(freedom, noncentrality, table.chance_bic + freedom * std::log(table.effective_points));
+}
+
 ScoreTable score_candidates(const Residuals& residuals, const Eigen::MatrixXd& slope,
                             const std::vector<Candidate>& candidates, const Whitening& whitening, unsigned seed) {
   const Scorer scorer(residuals, slope, candidates, whitening);
@@ -176,11 +188,14 @@ ScoreTable score_candidates(const Residuals& residuals, const Eigen::MatrixXd& s
   table.effective_points = whitening.effective_points();
   table.alike = scorer.alike();
   for (const Candidate& candidate : candidates) table.effects.push_back(candidate.effect);
-  const std::vector<double> maxima = scorer.null_maxima(seed);
+  std::vector<double> maxima = scorer.null_maxima(seed);
+  std::sort(maxima.begin(), maxima.end());
+  table.chance_bic = maxima[static_cast<std::size_t>((1 - chance) * null_draws)];
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     Score score = scorer.score(c);
-    const auto higher = std::count_if(maxima.begin(), maxima.end(), [&score](double b) { return b >= score.bic; });
+    const auto higher = maxima.end() - std::lower_bound(maxima.begin(), maxima.end(), score.bic);
     score.p_value = static_cast<double>(1 + higher) / static_cast<double>(1 + maxima.size());
+    score.power = power_of(table, score.freedom, score.noncentrality);
     for (std::size_t other = 0; other < candidates.size(); ++other)
       if (other != c && table.alike(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(other)) > same_direction)
         score.not_told_apart_from.push_back(candidates[other].effect);

@@ -25,9 +25,9 @@ struct Score {
   bool wrong_sign;          ///< one-sided, and the step goes to the other side: nothing along the slope
   bool beyond_range;        ///< a step leaves three times the range from null to bound: right shape, implausible amount
   double predicted_rms_mm;  ///< of all points after the joint linear step, steps cut at the bounds
-  double predicted_held_out_rms_mm;              ///< the same, every block of skin predicted without itself
-  double noncentrality;                          ///< λ at the typical size: under 9 this scan cannot see the effect
-  double power;                                  ///< chance to find the effect at its typical size, alone and at 5 %
+  double predicted_held_out_rms_mm;  ///< the same, every block of skin predicted without itself
+  double noncentrality;  ///< λ, T expected beyond noise at the typical size: along the secant where there is one
+  double power;          ///< chance that T at the typical size is above what 5 % of scans without any effect reach
   std::vector<std::string> not_told_apart_from;  ///< candidates with a canonical correlation above 0.9
 };
 
@@ -36,11 +36,15 @@ struct ScoreTable {
   double base_rms_mm;
   double base_held_out_rms_mm;
   double effective_points;
+  double chance_bic;                 ///< b of the best candidate that 5 % of scans without any effect exceed
   std::vector<std::string> effects;  ///< in the order of the candidates
   /// Largest canonical correlation of each two effects (sign aside) under Σ, what recalibration can absorb taken out: 1
   /// = this measurement cannot tell them apart.
   Eigen::MatrixXd alike;
 };
+
+/// Chance that an effect of @p freedom directions and @p noncentrality scores above chance, noise added.
+double power_of(const ScoreTable& table, int freedom, double noncentrality);
 
 /// Projected score test (Rao's; Lagrange multiplier) of every candidate. With d̃ = L⁻¹d, S̃ = L⁻¹S and Q an orthonormal
 /// basis of what recalibration can absorb, M = I − QQᵀ:

@@ -64,6 +64,17 @@ Surface refine_skin_edge(const Surface& surface, double edge_mm) {
   return refined(surface, mean_mm, fine);
 }
 
+double skin_edge_mm(const Surface& surface) {
+  double length = 0;
+  int count = 0;
+  for (const reconstruction::MeshEdge& edge : reconstruction::mesh_edges(surface.triangles)) {
+    if (!between_skin_and_cut(surface, edge)) continue;
+    length += (surface.points.row(edge.points[0]) - surface.points.row(edge.points[1])).norm();
+    ++count;
+  }
+  return count > 0 ? length / count : 0;
+}
+
 Surface refine_to_sizes(const Surface& surface, const SizeField& sizes) {
   const double mean_mm = mean_edge_mm(surface);
   std::vector<FinePlace> fine;

@@ -17,6 +17,9 @@ namespace supine::meshing {
 /// @throws InputError  edge_mm <= 0
 reconstruction::Surface refine_skin_edge(const reconstruction::Surface& surface, double edge_mm);
 
+/// Mean length of the edges between skin and cut face, mm; 0 where the two do not meet.
+double skin_edge_mm(const reconstruction::Surface& surface);
+
 /// Remeshes a surface so that its edges are as short as the size field asks for, down to an eighth of the mean edge;
 /// nowhere longer than they are. @return the same surface, regions and topology
 reconstruction::Surface refine_to_sizes(const reconstruction::Surface& surface, const SizeField& sizes);

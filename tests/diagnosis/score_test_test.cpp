@@ -139,13 +139,36 @@ TEST(ScoreTest, AlikeIsTheCorrelationOfWhatRecalibrationLeaves) {
 }
 
 TEST(ScoreTest, PowerIsThatOfTheNoncentralChiSquared) {
-  // Central: 5 %. λ with a power of 80 % (tables of the noncentral χ²): 7.849 (q = 1), 9.635 (2), 10.903 (3), 13.624
-  // (6).
-  for (const int q : {1, 2, 3, 6}) EXPECT_NEAR(chi_squared_power(q, 0), 0.05, 1e-6) << q;
-  EXPECT_NEAR(chi_squared_power(1, 7.849), 0.8, 1e-3);
-  EXPECT_NEAR(chi_squared_power(2, 9.635), 0.8, 1e-3);
-  EXPECT_NEAR(chi_squared_power(3, 10.903), 0.8, 1e-3);
-  EXPECT_NEAR(chi_squared_power(6, 13.624), 0.8, 1e-3);
+  // Quantiles of 95 %, and λ with a power of 80 % (tables of the central and the noncentral χ²).
+  constexpr struct {
+    int freedom;
+    double quantile, lambda;
+  } rows[] = {{1, 3.8415, 7.849}, {2, 5.9915, 9.635}, {3, 7.8147, 10.903}, {6, 12.5916, 13.624}};
+  for (const auto& [freedom, quantile, lambda] : rows) {
+    EXPECT_NEAR(chi_squared_power(freedom, 0, quantile), 0.05, 1e-5) << freedom;
+    EXPECT_NEAR(chi_squared_power(freedom, lambda, quantile), 0.8, 1e-3) << freedom;
+  }
+  EXPECT_EQ(chi_squared_power(1, 2e4, 10), 1);
+}
+
+TEST(ScoreTest, PowerIsTheShareOfScansThatScoreAboveChance) {
+  // A wave as large as its secant (less than the slope at its null promises) in fresh noise.
+  int found = 0;
+  double power = 0;
+  constexpr int trials = 200;
+  for (int trial = 0; trial < trials; ++trial) {
+    Residuals r = sheet(300 + static_cast<unsigned>(trial), 200);
+    auto candidates = catalogue_of(r);
+    const Eigen::VectorXd& wave = candidates[0].slope;
+    candidates[0].secant = 3.6 * 0.5 / wave.norm() * wave;  // 0.5 mm of noise
+    r.distance_mm += candidates[0].secant;
+    const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+    found += score_of(table, "wave").p_value < 0.05;
+    power += score_of(table, "wave").power / trials;
+  }
+  EXPECT_GT(power, 0.5);
+  EXPECT_LT(power, 0.95);
+  EXPECT_NEAR(found / static_cast<double>(trials), power, 4 * std::sqrt(power * (1 - power) / trials));
 }
 
 TEST(ScoreTest, ChiSquaredTailsAreThoseOfTheTables) {
