@@ -44,6 +44,7 @@ TEST(Grade, EdgesAreShortOnTheSkinsBorder) {
     const double wanted = share * meshing::mean_edge_mm(coarse);
     const Surface graded = meshing::refine_skin_edge(coarse, wanted);
     EXPECT_NEAR(mean(skin_edges_mm(graded)), wanted, 0.35 * wanted);
+    EXPECT_DOUBLE_EQ(meshing::skin_edge_mm(graded), mean(skin_edges_mm(graded)));
     EXPECT_LT(graded.triangles.rows(), 6 * coarse.triangles.rows());
     EXPECT_NO_THROW(meshing::tetrahedralise(graded, {.edge_mm = meshing::mean_edge_mm(coarse)}));
   }

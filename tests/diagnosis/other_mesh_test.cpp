@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/other_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "meshing/curve.h"
+#include "meshing/grade.h"
+#include "meshing/jacobian.h"
+#include "meshing/topology.h"
+#include "tests/support/shapes.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using meshing::TetMesh;
+
+TetMesh bent_dome() {
+  TetMesh mesh = meshing::to_quadratic(testing::dome_mesh({.rings = 8}));
+  meshing::curve_boundary(mesh, testing::dome_surface({.rings = 40}), nullptr);
+  return mesh;
+}
+
+double volume_mm3(const TetMesh& mesh) {
+  double sum = 0;
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c)
+    sum += mesh.order() == 2 ? meshing::curved_volume_mm3(meshing::quadratic_nodes(mesh, c))
+                             : meshing::cell_volume_mm3(mesh.points, mesh.cells, c);
+  return sum;
+}
+
+double skin_edge_of(const TetMesh& mesh) { return meshing::skin_edge_mm(testing::boundary_surface(mesh)); }
+
+TEST(OtherMesh, OfBentCellsIsBentOntoTheirFaces) {
+  const TetMesh mesh = bent_dome();
+  const meshing::Anatomy anatomy = meshing::compute_anatomy(mesh, "left");
+  const double bent = volume_mm3(mesh);
+  TetMesh flat = mesh;  // what straight edges between the same corners would leave out
+  for (Eigen::Index c = 0; c < flat.cells.rows(); ++c)
+    for (int e = 0; e < 6; ++e)
+      flat.points.row(flat.cells(c, 4 + e)) = (flat.points.row(flat.cells(c, meshing::tet_edges[e][0])) +
+                                               flat.points.row(flat.cells(c, meshing::tet_edges[e][1]))) /
+                                              2;
+  const double missed = bent - volume_mm3(flat);
+  ASSERT_GT(missed, 1e-3 * bent);
+  for (const TetMesh& other : {other_mesh(mesh, anatomy, 0.5), coarser_mesh(mesh, anatomy, 0.8)}) {
+    EXPECT_EQ(other.order(), 2);
+    EXPECT_LT(std::abs(volume_mm3(other) - bent), missed / 4);
+  }
+}
+
+TEST(OtherMesh, IsFinerAtTheSkinsEndThanTheMeshIsThere) {
+  TetMesh mesh = testing::dome_mesh({.rings = 6, .layers = 2});
+  for (int twice = 0; twice < 2; ++twice) {
+    const TetMesh finer = other_mesh(mesh, meshing::compute_anatomy(mesh, "left"), 0.5);
+    EXPECT_LT(skin_edge_of(finer), 0.7 * skin_edge_of(mesh)) << twice;
+    EXPECT_NEAR(volume_mm3(finer) / volume_mm3(mesh), 1, 1e-3);
+    mesh = finer;
+  }
+}
+
+}  // namespace
+}  // namespace supine::diagnosis
