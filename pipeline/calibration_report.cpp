@@ -126,7 +126,8 @@ Json calibration_figures(const MeasuredCase& measured, const FreeParameters& par
   for (std::size_t m = 0; m < measured.fitted.size(); ++m)
     f["poses"].push_back({{"pose", measured.fitted[m].pose.name},
                           {"noise_mm", result.noise_mm[m]},
-                          {"noise_is", measured.fitted[m].noise_mm ? "given" : "estimated"}});
+                          {"noise_is", measured.fitted[m].noise_mm ? "given" : "estimated"},
+                          {"points_left_out", measured.fitted[m].left_out.size()}});
   const auto& errors = result.uncertainty.errors;
   f["error_model"] = {{"nugget_mm", errors.nugget_mm},
                       {"shared_mm", errors.spread_mm},

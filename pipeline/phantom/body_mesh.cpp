@@ -20,7 +20,9 @@ using reconstruction::Region;
 using reconstruction::Surface;
 using segmentation::Tissue;
 
-constexpr int wall_layers = 2;
+// The skin's end on the wall sets how far the body slides: edges are short there (docs/supine-phantom.md).
+constexpr int wall_layers = 4;
+constexpr double crowding = 0.5;  // of the rings toward the rim: the last is half as wide as the mean
 constexpr double sheet_margin_mm = 45, sheet_spacing_mm = 4;
 constexpr double least_det = 0.3;  // of a bent cell against its straight one
 
@@ -50,8 +52,10 @@ std::vector<Eigen::Vector2d> disc_points(int rings, Random& random) {
   for (int k = 1; k <= rings; ++k)
     for (int j = 0; j < 6 * k; ++j) {
       // The rim stays a circle; inside, points are shaken so that the mesh follows nothing.
-      const double shake = k == rings ? 0 : 0.18 / rings;
-      const double angle = 2 * std::numbers::pi * (j + turn) / (6 * k), radius = static_cast<double>(k) / rings;
+      const double share = static_cast<double>(k) / rings, width = (1 + crowding * (1 - 2 * share)) / rings;
+      const double shake = k == rings ? 0 : 0.18 * width;
+      const double angle = 2 * std::numbers::pi * (j + turn) / (6 * k);
+      const double radius = share + crowding * share * (1 - share);
       points.emplace_back(radius * std::cos(angle) + shake * random.uniform(-1, 1),
                           radius * std::sin(angle) + shake * random.uniform(-1, 1));
     }

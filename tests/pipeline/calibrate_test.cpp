@@ -103,6 +103,12 @@ TEST_F(Calibrate, LeavesOutPointsThatStandOutAndSaysSo) {
   ASSERT_LE(finished.code, 1) << finished.err;
   EXPECT_NE(finished.err.find("supine.ply"), std::string::npos) << finished.err;
   EXPECT_NE(finished.err.find("stand out of their neighbours"), std::string::npos) << finished.err;
+  const auto left_out = [this](const char* run) {
+    return json(fs::path(run) / "calibration.json")["poses"][0]["points_left_out"].get<int>();
+  };
+  EXPECT_LE(left_out("as_it_is"), 2);
+  EXPECT_GE(left_out("dirty"), row / 40);  // of one in thirty, some lie beyond the model's skin
+  EXPECT_LE(left_out("dirty"), row / 30 + 1);
   for (const char* key : {"rms_mm", "mae_study_mm"}) {
     const double clean = json("as_it_is/calibration.json")[key].get<double>();
     EXPECT_NEAR(json("dirty/calibration.json")[key].get<double>(), clean, 0.2 * clean) << key;
