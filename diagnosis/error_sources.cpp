@@ -53,9 +53,13 @@ double tolerance_for(const std::string& effect, const std::string& unit, const T
 void set_numerical(const NumericalError& numerical, const Tolerances& tolerances, ErrorSources& sources) {
   std::erase_if(sources.modes, [](const ErrorMode& mode) { return mode.source == "mesh"; });
   sources.mean_mm = tolerances.correction * numerical.finer_mm;
-  sources.modes.push_back({"mesh", numerical.finer_mm});
+  sources.modes.push_back({"mesh", numerical.finer_doubt * numerical.finer_mm});
   sources.modes.push_back({"mesh", numerical.coarser_mm});
   sources.spread_mm = numerical.spread_mm;
+  sources.share = numerical.share;
+  if (!numerical.unfitted_mm.empty()) sources.unfitted_mean_mm.clear();
+  for (const Eigen::VectorXd& change : numerical.unfitted_mm)
+    sources.unfitted_mean_mm.push_back(tolerances.correction * change);
   sources.length_mm = numerical.length_mm;
 }
 

@@ -32,12 +32,15 @@ struct ErrorMode {
 };
 
 /// Everything but a missing effect that keeps distances from zero. With d the distances at a model that lacks nothing,
-///   d + mean_mm ~ N(0, Σ),   Σ = diag(noise²) + Σ_m shape_m shape_mᵀ + spread² exp(−|y_i − y_j| / length)
+///   d + mean_mm ~ N(0, Σ),   Σ = diag(noise²) + Σ_m shape_m shape_mᵀ + s_i s_j exp(−|y_i − y_j| / length),
+/// s_i = spread × share_i
 struct ErrorSources {
-  Eigen::VectorXd noise_mm;  ///< #R
-  Eigen::VectorXd mean_mm;   ///< #R
+  Eigen::VectorXd noise_mm;                       ///< #R
+  Eigen::VectorXd mean_mm;                        ///< #R
+  std::vector<Eigen::VectorXd> unfitted_mean_mm;  ///< mean_mm for all points of each unfitted measurement; empty = 0
   std::vector<ErrorMode> modes;
-  double spread_mm = 0, length_mm = 1;  ///< what the mesh does beyond its modes; 0 = nothing
+  double spread_mm = 0, length_mm = 1;  ///< what the mesh does beyond its modes, rms; 0 = nothing
+  Eigen::VectorXd share;                ///< #R, of the spread at each point; mean square 1; empty = 1 everywhere
 };
 
 /// Puts what the mesh does into the sources: mean, modes (one per other mesh), spread.

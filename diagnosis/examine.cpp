@@ -35,7 +35,7 @@ void measure_mesh(const Subject& subject, const simulation::Model& model, const 
   }
   tell(options, "two other meshes");
   try {
-    found.numerical = measure_numerical_error(subject.fitted, model, fit);
+    found.numerical = measure_numerical_error(subject.fitted, model, fit, &subject.whole);
   } catch (const NumericalFailure& failure) {
     found.numerical_failure = failure.what();
   }

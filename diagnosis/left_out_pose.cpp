@@ -19,6 +19,7 @@ ErrorSources part_of(const ErrorSources& all, const std::vector<int>& rows) {
   ErrorSources part = all;
   part.noise_mm = all.noise_mm(rows);
   part.mean_mm = all.mean_mm(rows);
+  if (all.share.size() > 0) part.share = all.share(rows);
   for (ErrorMode& mode : part.modes) mode.shape_mm = Eigen::VectorXd(mode.shape_mm(rows));
   return part;
 }

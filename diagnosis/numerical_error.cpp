@@ -3,30 +3,64 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "calibration/error_model.h"
 #include "common/error.h"
 #include "diagnosis/other_mesh.h"
+#include "meshing/topology.h"
 
 namespace supine::diagnosis {
 namespace {
 
 using calibration::Residuals;
 
+constexpr double order_doubt = 0.3;     // of the change that quadratic elements make
 constexpr double edge_share = 0.5;      // of the finer mesh's edges where skin and cut face meet
 constexpr double triangle_share = 0.8;  // of the coarser surface
 
 double mean_square(const Eigen::VectorXd& x) { return x.squaredNorm() / static_cast<double>(x.size()); }
 
-/// Change of distance of the residuals' points. Points beyond the border of the other mesh keep theirs.
-Eigen::VectorXd change_on(const calibration::Scene& scene, const meshing::TetMesh& mesh, const simulation::Model& model,
-                          const Residuals& residuals) {
+/// A field on the corners of linear tetrahedra as one on the nodes of quadratic ones of the same shapes.
+Points on_quadratic(const meshing::TetMesh& quadratic, const Points& corners) {
+  Points all(quadratic.points.rows(), 3);
+  all.topRows(corners.rows()) = corners;
+  for (Eigen::Index c = 0; c < quadratic.cells.rows(); ++c)
+    for (int e = 0; e < 6; ++e)
+      all.row(quadratic.cells(c, 4 + e)) = 0.5 * (corners.row(quadratic.cells(c, meshing::tet_edges[e][0])) +
+                                                  corners.row(quadratic.cells(c, meshing::tet_edges[e][1])));
+  return all;
+}
+
+simulation::ChainSolution on_quadratic(const meshing::TetMesh& quadratic, const simulation::ChainSolution& linear) {
+  simulation::ChainSolution start;
+  start.prone = on_quadratic(quadratic, linear.prone);
+  start.X = on_quadratic(quadratic, linear.X);
+  for (const simulation::PoseSolution& pose : linear.poses) {
+    start.poses.push_back({});
+    start.poses.back().name = pose.name;
+    start.poses.back().x = on_quadratic(quadratic, pose.x);
+  }
+  return start;
+}
+
+/// The model on another mesh.
+/// @param near  solution on @p mesh to start from, or nullptr
+calibration::Prediction predicted_on(const calibration::Scene& scene, const meshing::TetMesh& mesh,
+                                     const simulation::Model& model, const simulation::ChainSolution* near) {
   const meshing::Anatomy anatomy = meshing::compute_anatomy(mesh, scene.anatomy->side);
   calibration::Scene other = scene;
   other.mesh = &mesh;
   other.anatomy = &anatomy;
-  calibration::Evaluator evaluator(other, model);
-  const calibration::Prediction prediction = evaluator.predict(model);
+  simulation::SolveOptions enough;  // for a change of tenths of a millimetre
+  enough.step_tolerance_mm = 1e-3;
+  enough.residual_tolerance = 1e-6;
+  calibration::Evaluator evaluator(other, model, enough);
+  return evaluator.predict(model, near);
+}
+
+/// Change of distance of the residuals' points. Points beyond the border of the other mesh keep theirs.
+Eigen::VectorXd change_of(const Residuals& residuals, const calibration::Prediction& prediction) {
   Eigen::VectorXd change = Eigen::VectorXd::Zero(residuals.size());
   for (Eigen::Index r = 0; r < residuals.size(); ++r) {
     const auto& distances = prediction.poses[static_cast<std::size_t>(residuals.pose[r])].distances;
@@ -34,6 +68,60 @@ Eigen::VectorXd change_on(const calibration::Scene& scene, const meshing::TetMes
     if (!distances.closest.on_border[point]) change[r] = distances.distance_mm[point] - residuals.distance_mm[r];
   }
   return change;
+}
+
+/// The same of all points of the measurements from @p first on.
+std::vector<Eigen::VectorXd> change_of_others(std::size_t first, const calibration::Prediction& given,
+                                              const calibration::Prediction& finer) {
+  std::vector<Eigen::VectorXd> all;
+  for (std::size_t m = first; m < given.poses.size(); ++m) {
+    const auto &before = given.poses[m].distances, &after = finer.poses[m].distances;
+    Eigen::VectorXd change = after.distance_mm - before.distance_mm;
+    for (Eigen::Index i = 0; i < change.size(); ++i)
+      if (before.closest.on_border[i] || after.closest.on_border[i]) change[i] = 0;
+    all.push_back(std::move(change));
+  }
+  return all;
+}
+
+/// Fills finer_mm and unfitted_mm.
+void measure_finer(const calibration::Scene& scene, const simulation::Model& model, const calibration::Fit& fit,
+                   const calibration::Scene* whole, NumericalError& result) {
+  const std::size_t fitted = scene.measurements.size();
+  const bool more = whole != nullptr && whole->measurements.size() > fitted;
+  std::optional<calibration::Prediction> given;
+  if (more) given = calibration::Evaluator(*whole, model).predict(model);
+  const simulation::ChainSolution& linear = more ? given->solution : fit.prediction.solution;
+  const bool order = scene.mesh->order() == 1;
+  const meshing::TetMesh mesh =
+      order ? meshing::to_quadratic(*scene.mesh) : other_mesh(*scene.mesh, *scene.anatomy, edge_share);
+  std::optional<simulation::ChainSolution> start;
+  if (order) start = on_quadratic(mesh, linear);
+  const calibration::Prediction finer = predicted_on(more ? *whole : scene, mesh, model, start ? &*start : nullptr);
+  result.finer_mm = change_of(fit.residuals, finer);
+  if (more) result.unfitted_mm = change_of_others(fitted, *given, finer);
+}
+
+/// Root of a field of squares as seen around each point, over its root mean square: edges and folds err by more than
+/// the mound. Nowhere under a half of it.
+Eigen::VectorXd share_around(const Residuals& residuals, const Eigen::VectorXd& square) {
+  constexpr double around_mm = 15, least = 0.25;
+  if (!(square.mean() > 0)) return Eigen::VectorXd::Ones(residuals.size());
+  const calibration::Clusters clusters = calibration::cluster_points(residuals, 450);
+  const Eigen::VectorXd mean = clusters.means(square);
+  Eigen::VectorXd around(mean.size());
+  for (Eigen::Index i = 0; i < mean.size(); ++i) {
+    double sum = 0, points = 0;
+    for (Eigen::Index j = 0; j < mean.size(); ++j)
+      if (clusters.pose[i] == clusters.pose[j] && (clusters.place.row(i) - clusters.place.row(j)).norm() < around_mm) {
+        sum += clusters.members[j] * mean[j];
+        points += clusters.members[j];
+      }
+    around[i] = std::max(sum / points, least * square.mean());
+  }
+  Eigen::VectorXd share(residuals.size());
+  for (Eigen::Index r = 0; r < share.size(); ++r) share[r] = std::sqrt(around[clusters.of_point[r]]);
+  return share / std::sqrt(mean_square(share));
 }
 
 }  // namespace
@@ -60,32 +148,36 @@ double correlation_length_mm(const Residuals& residuals, const Eigen::VectorXd& 
 }
 
 NumericalError measure_numerical_error(const calibration::Scene& scene, const simulation::Model& model,
-                                       const calibration::Fit& fit) {
+                                       const calibration::Fit& fit, const calibration::Scene* whole) {
   NumericalError result;
-  Eigen::VectorXd change[2];
+  result.finer_doubt = scene.mesh->order() == 1 ? order_doubt : 1;
+  result.finer_mm = result.coarser_mm = Eigen::VectorXd::Zero(fit.residuals.size());
   std::string reason[2];
 #pragma omp parallel for schedule(static, 1)
   for (int k = 0; k < 2; ++k) {
     try {
-      const meshing::TetMesh mesh = k == 0 ? other_mesh(*scene.mesh, *scene.anatomy, edge_share)
-                                           : coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share);
-      change[k] = change_on(scene, mesh, model, fit.residuals);
+      if (k == 0)
+        measure_finer(scene, model, fit, whole, result);
+      else
+        result.coarser_mm =
+            change_of(fit.residuals,
+                      predicted_on(scene, coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share), model, nullptr));
     } catch (const std::exception& failure) {
       reason[k] = std::string(k == 0 ? "finer" : "coarser") + " mesh: " + failure.what();
-      change[k] = Eigen::VectorXd::Zero(fit.residuals.size());
     }
   }
   for (const std::string& r : reason)
     if (!r.empty()) result.failed.push_back(r);
   if (result.failed.size() == 2)
     throw NumericalFailure("the error of the mesh cannot be measured: " + reason[0] + "; " + reason[1]);
-  result.finer_mm = change[0];
-  result.coarser_mm = change[1];
   const double twice = result.failed.empty() ? 1 : 2;
-  result.spread_mm = std::sqrt(twice * (mean_square(change[0]) + mean_square(change[1])));
+  const Eigen::VectorXd square =
+      std::pow(result.finer_doubt, 2) * result.finer_mm.cwiseAbs2() + result.coarser_mm.cwiseAbs2();
+  result.spread_mm = std::sqrt(twice * square.mean());
+  result.share = share_around(fit.residuals, square);
   result.length_mm = 0.5 * twice *
-                     ((reason[0].empty() ? correlation_length_mm(fit.residuals, change[0]) : 0) +
-                      (reason[1].empty() ? correlation_length_mm(fit.residuals, change[1]) : 0));
+                     ((reason[0].empty() ? correlation_length_mm(fit.residuals, result.finer_mm) : 0) +
+                      (reason[1].empty() ? correlation_length_mm(fit.residuals, result.coarser_mm) : 0));
   return result;
 }
 

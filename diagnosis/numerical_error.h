@@ -11,17 +11,26 @@ namespace supine::diagnosis {
 
 /// What the mesh does to the distances of this patient: the same model solved on other meshes of the same body.
 struct NumericalError {
-  Eigen::VectorXd finer_mm;    ///< #R, distance on a mesh refined where the error is made, less that on the given mesh
+  Eigen::VectorXd finer_mm;    ///< #R, distance with finer elements, less that on the given mesh
+  double finer_doubt = 1;      ///< how uncertain finer_mm is, as a share of it
   Eigen::VectorXd coarser_mm;  ///< #R, the same for another surface of four fifths of the triangles
-  double spread_mm = 0;        ///< rms of both together: what is left when finer_mm has been added
+  double spread_mm = 0;        ///< rms of finer_doubt × finer_mm and coarser_mm: what is left when finer_mm was added
+  Eigen::VectorXd share;       ///< #R, of the spread at each point: what the places around it show; mean square 1
   double length_mm = 0;        ///< over which it is alike
+  /// Change of finer elements for every scan point of the measurements that are not fitted, in the order of the scene;
+  /// 0 where the point lies beyond the border. Empty when not asked for or when the finer mesh gave no answer.
+  std::vector<Eigen::VectorXd> unfitted_mm;
   std::vector<std::string> failed;  ///< why a mesh gave no answer; its column is zero and the other counts twice
 };
 
-/// Two other meshes (other_mesh.h), one solve each, side by side.
+/// Two other meshes, one solve each, side by side. Finer than linear tetrahedra are quadratic ones of the same shapes
+/// (nearly all of the error is in the order: at the true moduli of a computed breast they leave noise and a third of
+/// the change, docs/diagnosis.md), finer than quadratic ones a mesh refined at the skin's end; coarser_mesh
+/// (other_mesh.h).
+/// @param whole  the scene and, after its measurements, those that are not fitted; nullptr = these are not asked for
 /// @throws NumericalFailure  neither mesh gave an answer
 NumericalError measure_numerical_error(const calibration::Scene& scene, const simulation::Model& model,
-                                       const calibration::Fit& fit);
+                                       const calibration::Fit& fit, const calibration::Scene* whole = nullptr);
 
 /// Length l of exp(−r/l) that fits the correlation of neighbours in @p field, a change over the residuals' points with
 /// or without a mean; between 5 and 60 mm.

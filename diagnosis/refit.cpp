@@ -224,10 +224,14 @@ std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulatio
     const calibration::Prediction prediction = evaluator.predict(model);
     for (std::size_t m = fitted; m < problem.whole.measurements.size(); ++m) {
       const auto& distances = prediction.poses[m].distances;
+      const auto& means = problem.sources->unfitted_mean_mm;
+      const Eigen::VectorXd d =
+          distances.distance_mm +
+          (means.empty() ? Eigen::VectorXd::Zero(distances.distance_mm.size()).eval() : means[m - fitted]);
       double sum = 0;
       Eigen::Index count = 0;
       for (Eigen::Index i = 0; i < distances.distance_mm.size(); ++i)
-        if (!distances.closest.on_border[i]) sum += std::pow(distances.distance_mm[i], 2), ++count;
+        if (!distances.closest.on_border[i]) sum += d[i] * d[i], ++count;
       all.push_back(std::sqrt(sum / static_cast<double>(count)));
     }
   } catch (const NumericalFailure&) {

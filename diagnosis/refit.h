@@ -62,7 +62,7 @@ std::vector<FittedParameter> linear_intervals(const std::string& effect, const W
 /// Information of the priors, 0 where there is none.
 Eigen::VectorXd prior_information(const calibration::FreeParameters& parameters);
 
-/// Root mean square distance of each pose that is not fitted.
+/// Root mean square distance of each pose that is not fitted, the mesh's error taken away as far as it is known.
 std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model);
 
 /// How many unfitted poses a model can be judged by: none where the base model says that the fitted scan lies

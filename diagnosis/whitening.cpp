@@ -20,7 +20,7 @@ Whitening Whitening::correlated(const calibration::Residuals& residuals, const c
   whitening.clusters_ = calibration::cluster_points(residuals, most);
   const calibration::Clusters& clusters = whitening.clusters_;
   whitening.factorise(errors.nugget_mm * errors.nugget_mm * clusters.members.cwiseInverse(),
-                      errors.spread_mm * errors.spread_mm, errors.length_mm, {});
+                      Eigen::VectorXd::Constant(clusters.members.size(), errors.spread_mm), errors.length_mm, {});
   whitening.effective_points_ = errors.effective_count(residuals);
   return whitening;
 }
@@ -33,23 +33,27 @@ Whitening Whitening::of(const calibration::Residuals& residuals, const ErrorSour
   Eigen::MatrixXd modes(residuals.size(), static_cast<Eigen::Index>(sources.modes.size()));
   for (std::size_t m = 0; m < sources.modes.size(); ++m)
     modes.col(static_cast<Eigen::Index>(m)) = sources.modes[m].shape_mm;
-  whitening.factorise(variance.cwiseQuotient(clusters.members), sources.spread_mm * sources.spread_mm,
+  const Eigen::VectorXd share =
+      sources.share.size() > 0 ? sources.share : Eigen::VectorXd::Ones(residuals.size()).eval();
+  whitening.factorise(variance.cwiseQuotient(clusters.members), sources.spread_mm * clusters.means(share),
                       sources.length_mm, clusters.means(modes));
   const calibration::ErrorModel errors{std::sqrt(variance.mean()), sources.spread_mm, sources.length_mm};
   whitening.effective_points_ = errors.effective_count(residuals);
   return whitening;
 }
 
-void Whitening::factorise(Eigen::VectorXd nugget, double shared, double length_mm, const Eigen::MatrixXd& modes) {
+void Whitening::factorise(const Eigen::VectorXd& nugget, const Eigen::VectorXd& spread_mm, double length_mm,
+                          const Eigen::MatrixXd& modes) {
   const Eigen::Index count = nugget.size();
   Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(count, count);
   if (modes.size() > 0) sigma.noalias() = modes * modes.transpose();
 #pragma omp parallel for schedule(static)
   for (Eigen::Index i = 0; i < count; ++i) {
-    sigma(i, i) += nugget[i] + shared;
+    sigma(i, i) += nugget[i] + spread_mm[i] * spread_mm[i];
     for (Eigen::Index j = 0; j < i; ++j)
       if (clusters_.pose[i] == clusters_.pose[j])
-        sigma(i, j) += shared * std::exp(-(clusters_.place.row(i) - clusters_.place.row(j)).norm() / length_mm);
+        sigma(i, j) += spread_mm[i] * spread_mm[j] *
+                       std::exp(-(clusters_.place.row(i) - clusters_.place.row(j)).norm() / length_mm);
   }
   factor_.compute(sigma);  // reads the lower half
   if (factor_.info() != Eigen::Success)

@@ -29,7 +29,9 @@ class Whitening {
   const calibration::Clusters& clusters() const { return clusters_; }
 
  private:
-  void factorise(Eigen::VectorXd nugget, double shared, double length_mm, const Eigen::MatrixXd& modes);
+  /// @param spread_mm  of each cluster
+  void factorise(const Eigen::VectorXd& nugget, const Eigen::VectorXd& spread_mm, double length_mm,
+                 const Eigen::MatrixXd& modes);
 
   Eigen::VectorXd sigma_;               // independent
   calibration::Clusters clusters_;      // correlated
