@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "calibration/free_parameters.h"
 #include "common/error.h"
 #include "tests/calibration/twin.h"
@@ -31,8 +33,51 @@ TEST(NumericalError, IsWhatTwoOtherMeshesChange) {
   const NumericalError error = measure_numerical_error(f.twin.scene(), twin_truth(), f.fit);
   EXPECT_TRUE(error.failed.empty());
   EXPECT_GT(error.spread_mm, 0);
-  EXPECT_NEAR(error.spread_mm * error.spread_mm * static_cast<double>(f.fit.residuals.size()),
-              error.finer_mm.squaredNorm() + error.coarser_mm.squaredNorm(), 1e-9);
+  const double points = static_cast<double>(f.fit.residuals.size());
+  EXPECT_NEAR(error.spread_mm * error.spread_mm * points,
+              std::pow(error.finer_doubt, 2) * error.finer_mm.squaredNorm() + error.coarser_mm.squaredNorm(), 1e-9);
+  EXPECT_NEAR(error.share.squaredNorm(), points, 1e-6);
+  EXPECT_GE(error.share.minCoeff(), 0.4) << "no place is without error";
+  EXPECT_GT(error.share.maxCoeff(), 1.2) << "places differ";
+}
+
+/// Scan by quadratic elements, model of the linear ones of the same shapes.
+struct LinearOfQuadratic {
+  LinearOfQuadratic() : twin(quadratic_twin()), scene(twin.scene()) {
+    scene.mesh = &supine::testing::dome_scene().mesh;
+    scene.anatomy = &supine::testing::dome_scene().anatomy;
+    calibration::Evaluator evaluator(scene, twin_truth());
+    const calibration::FreeParameters parameters(twin_truth());
+    calibration::FitOptions options;
+    options.noise_mm = {0.05};
+    fit = calibration::evaluate_fit(evaluator, parameters, options, parameters.start());
+  }
+
+  static Twin::Options quadratic_twin() {
+    Twin::Options options{twin_truth(), 0.05};
+    options.body = &supine::testing::dome_scene(2);
+    return options;
+  }
+
+  Twin twin;
+  calibration::Scene scene;
+  calibration::Fit fit;
+};
+
+double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
+
+TEST(NumericalError, QuadraticElementsTakeAwayWhatLinearOnesErr) {
+  const LinearOfQuadratic f;
+  calibration::Scene whole = f.scene;
+  whole.measurements.push_back(f.scene.measurements[0]);  // looked at as well, not fitted
+  const NumericalError error = measure_numerical_error(f.scene, twin_truth(), f.fit, &whole);
+  EXPECT_TRUE(error.failed.empty());
+  const Eigen::VectorXd& d = f.fit.residuals.distance_mm;
+  ASSERT_GT(rms(d), 0.2) << "linear elements err";
+  EXPECT_LT(rms(d + error.finer_mm), 0.08) << "of which 0.05 mm are noise";
+  ASSERT_EQ(error.unfitted_mm.size(), 1u);
+  for (Eigen::Index r = 0; r < d.size(); r += 7)
+    EXPECT_NEAR(error.unfitted_mm[0][f.fit.residuals.point[r]], error.finer_mm[r], 0.01);
 }
 
 TEST(NumericalError, SaysWhyNeitherMeshGaveAnAnswer) {

@@ -25,15 +25,19 @@ ErrorSources sources_of(const calibration::Residuals& r) {
 
 TEST(Whitening, ErrorsOfAllSourcesBecomeIndependent) {
   const calibration::Residuals r = sheet(6, 300);
-  const Whitening whitening = Whitening::of(r, sources_of(r));
+  ErrorSources sources = sources_of(r);
+  sources.share = (1 + 0.5 * (r.place.col(1).array() / 20).sin()).matrix();
+  const Whitening whitening = Whitening::of(r, sources);
   const calibration::Clusters& clusters = whitening.clusters();
   const Eigen::Index n = clusters.members.size();
+  const Eigen::VectorXd share = clusters.means(sources.share);
   const Eigen::VectorXd mode = clusters.means(r.place.col(0) / 60);
   Eigen::MatrixXd sigma = mode * mode.transpose();
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < n; ++j)
-      sigma(i, j) += 0.09 * std::exp(-(clusters.place.row(i) - clusters.place.row(j)).norm() / 15) +
-                     (i == j ? 0.25 / clusters.members[i] : 0);
+      sigma(i, j) +=
+          0.09 * share[i] * share[j] * std::exp(-(clusters.place.row(i) - clusters.place.row(j)).norm() / 15) +
+          (i == j ? 0.25 / clusters.members[i] : 0);
   Eigen::MatrixXd by_point(300, n);
   for (int i = 0; i < 300; ++i) by_point.row(i) = sigma.row(clusters.of_point[i]);
   const Eigen::MatrixXd half = whitening.apply(by_point);  // L⁻¹ Σ = Lᵀ
