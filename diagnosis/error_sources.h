@@ -17,7 +17,7 @@ struct Tolerances {
   double registration_rad = 0.0036;  ///< turn of the scan: 0.3 mm at 80 mm
   double segmentation_mm = 0.3;      ///< offset of the imaged skin: a fifth of a 1.5 mm voxel
   double chest_wall_mm = 1;          ///< the muscle between two scans: breath, and where its border was drawn
-  double incompressibility = 0.25;   ///< of the catalogue's a: linear tetrahedra lock, and ν itself is assumed
+  double incompressibility = 0.1;    ///< of the catalogue's a: ν itself is assumed
   double effect_form = 0.07;  ///< of the size of a tissue effect: where it ends and how it mixes are the catalogue's
   double correction = 1;      ///< of the finer mesh's change is added to the distances, give or take the same
 };
