@@ -44,18 +44,24 @@ simulation::ChainSolution on_quadratic(const meshing::TetMesh& quadratic, const 
   return start;
 }
 
+/// Enough for a change of tenths of a millimetre.
+simulation::SolveOptions enough() {
+  simulation::SolveOptions options;
+  options.step_tolerance_mm = 1e-3;
+  options.residual_tolerance = 1e-5;
+  return options;
+}
+
 /// The model on another mesh.
 /// @param near  solution on @p mesh to start from, or nullptr
 calibration::Prediction predicted_on(const calibration::Scene& scene, const meshing::TetMesh& mesh,
-                                     const simulation::Model& model, const simulation::ChainSolution* near) {
+                                     const simulation::Model& model, const simulation::ChainSolution* near,
+                                     const simulation::SolveOptions& options) {
   const meshing::Anatomy anatomy = meshing::compute_anatomy(mesh, scene.anatomy->side);
   calibration::Scene other = scene;
   other.mesh = &mesh;
   other.anatomy = &anatomy;
-  simulation::SolveOptions enough;  // for a change of tenths of a millimetre
-  enough.step_tolerance_mm = 1e-3;
-  enough.residual_tolerance = 1e-6;
-  calibration::Evaluator evaluator(other, model, enough);
+  calibration::Evaluator evaluator(other, model, options);
   return evaluator.predict(model, near);
 }
 
@@ -84,22 +90,38 @@ std::vector<Eigen::VectorXd> change_of_others(std::size_t first, const calibrati
   return all;
 }
 
+/// Change of quadratic elements for poses that are not fitted, from their solution for those that are. They only
+/// confirm: a pose that does not come out in a few steps is left as it is.
+std::vector<Eigen::VectorXd> change_of_unfitted(const calibration::Scene& whole, std::size_t fitted,
+                                                const meshing::TetMesh& mesh, const simulation::Model& model,
+                                                simulation::ChainSolution start) {
+  simulation::SolveOptions few = enough();
+  few.max_iterations = 12;
+  few.smallest_load_step = 1;
+  try {
+    const calibration::Prediction given = calibration::Evaluator(whole, model).predict(model);
+    const simulation::ChainSolution there = on_quadratic(mesh, given.solution);
+    start.poses.insert(start.poses.end(), there.poses.begin() + static_cast<std::ptrdiff_t>(fitted), there.poses.end());
+    return change_of_others(fitted, given, predicted_on(whole, mesh, model, &start, few));
+  } catch (const NumericalFailure&) {
+    return {};
+  }
+}
+
 /// Fills finer_mm and unfitted_mm.
 void measure_finer(const calibration::Scene& scene, const simulation::Model& model, const calibration::Fit& fit,
                    const calibration::Scene* whole, NumericalError& result) {
-  const std::size_t fitted = scene.measurements.size();
-  const bool more = whole != nullptr && whole->measurements.size() > fitted;
-  std::optional<calibration::Prediction> given;
-  if (more) given = calibration::Evaluator(*whole, model).predict(model);
-  const simulation::ChainSolution& linear = more ? given->solution : fit.prediction.solution;
-  const bool order = scene.mesh->order() == 1;
-  const meshing::TetMesh mesh =
-      order ? meshing::to_quadratic(*scene.mesh) : other_mesh(*scene.mesh, *scene.anatomy, edge_share);
-  std::optional<simulation::ChainSolution> start;
-  if (order) start = on_quadratic(mesh, linear);
-  const calibration::Prediction finer = predicted_on(more ? *whole : scene, mesh, model, start ? &*start : nullptr);
+  if (scene.mesh->order() != 1) {
+    const meshing::TetMesh mesh = other_mesh(*scene.mesh, *scene.anatomy, edge_share);
+    result.finer_mm = change_of(fit.residuals, predicted_on(scene, mesh, model, nullptr, enough()));
+    return;
+  }
+  const meshing::TetMesh mesh = meshing::to_quadratic(*scene.mesh);
+  const simulation::ChainSolution start = on_quadratic(mesh, fit.prediction.solution);
+  const calibration::Prediction finer = predicted_on(scene, mesh, model, &start, enough());
   result.finer_mm = change_of(fit.residuals, finer);
-  if (more) result.unfitted_mm = change_of_others(fitted, *given, finer);
+  if (whole != nullptr && whole->measurements.size() > scene.measurements.size())
+    result.unfitted_mm = change_of_unfitted(*whole, scene.measurements.size(), mesh, model, finer.solution);
 }
 
 /// Root of a field of squares as seen around each point, over its root mean square: edges and folds err by more than
@@ -159,9 +181,9 @@ NumericalError measure_numerical_error(const calibration::Scene& scene, const si
       if (k == 0)
         measure_finer(scene, model, fit, whole, result);
       else
-        result.coarser_mm =
-            change_of(fit.residuals,
-                      predicted_on(scene, coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share), model, nullptr));
+        result.coarser_mm = change_of(
+            fit.residuals,
+            predicted_on(scene, coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share), model, nullptr, enough()));
     } catch (const std::exception& failure) {
       reason[k] = std::string(k == 0 ? "finer" : "coarser") + " mesh: " + failure.what();
     }

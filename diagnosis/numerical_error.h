@@ -18,7 +18,8 @@ struct NumericalError {
   Eigen::VectorXd share;       ///< #R, of the spread at each point: what the places around it show; mean square 1
   double length_mm = 0;        ///< over which it is alike
   /// Change of finer elements for every scan point of the measurements that are not fitted, in the order of the scene;
-  /// 0 where the point lies beyond the border. Empty when not asked for or when the finer mesh gave no answer.
+  /// 0 where the point lies beyond the border. Empty when not asked for, for quadratic meshes, and where a pose does
+  /// not come out in a few steps.
   std::vector<Eigen::VectorXd> unfitted_mm;
   std::vector<std::string> failed;  ///< why a mesh gave no answer; its column is zero and the other counts twice
 };
