@@ -30,11 +30,12 @@ PhantomOptions coarse(std::uint64_t seed) {
 
 TEST(Body, SeedsDifferAndMeshesStandOnTheMuscle) {
   EXPECT_NE(draw_body(1).height_mm, draw_body(2).height_mm);
+  constexpr int rings = 9;  // middles of still larger cells may stay 0.2 mm off the muscle
   bool left = false, right = false;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const Body body = draw_body(seed);
     (body.side == "left" ? left : right) = true;
-    const BodyMesh made = mesh_body(body, seed, coarse_rings, 2);
+    const BodyMesh made = mesh_body(body, seed, rings, 2);
     for (Eigen::Index c = 0; c < made.mesh.cells.rows(); ++c)
       ASSERT_GT(meshing::cell_volume_mm3(made.mesh.points, made.mesh.cells, c), 0) << "seed " << seed;
     // The lateral direction points to the patient's outer side, the nipple away from the chest.

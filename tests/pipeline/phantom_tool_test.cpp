@@ -119,8 +119,8 @@ TEST(PhantomTool, CalibratedNullComesBackToItsModuli) {
     EXPECT_GE(row["interval95"][1].get<double>(), value) << row["name"];
     EXPECT_NEAR(row["value"].get<double>(), value, 0.3 * value) << row["name"];
   }
-  // Nothing is missing, so noise is nearly all that is left.
-  EXPECT_LT(fitted["rms_mm"].get<double>(), 0.95);
+  // Nothing is missing: what is left are 0.7 mm of noise and what linear elements of 1,500 triangles err, 0.6 mm.
+  EXPECT_LT(fitted["rms_mm"].get<double>(), 1.0);
 }
 
 }  // namespace
