@@ -19,7 +19,8 @@ struct Tolerances {
   double chest_wall_mm = 1;          ///< the muscle between two scans: breath, and where its border was drawn
   double incompressibility = 0.1;    ///< of the catalogue's a: ν itself is assumed
   double effect_form = 0.07;  ///< of the size of a tissue effect: where it ends and how it mixes are the catalogue's
-  double correction = 1;      ///< of the finer mesh's change is added to the distances, give or take the same
+  double correction = 1;      ///< share of the finer mesh's change that is added to the distances, give or take
+                              ///< NumericalError::finer_doubt of it
 };
 
 /// How well a parameter of an effect is known to be at its null, 1 sigma; 0 for effects that are no source of error.
