@@ -57,9 +57,6 @@ void set_numerical(const NumericalError& numerical, const Tolerances& tolerances
   sources.modes.push_back({"mesh", numerical.coarser_mm});
   sources.spread_mm = numerical.spread_mm;
   sources.share = numerical.share;
-  if (!numerical.unfitted_mm.empty()) sources.unfitted_mean_mm.clear();
-  for (const Eigen::VectorXd& change : numerical.unfitted_mm)
-    sources.unfitted_mean_mm.push_back(tolerances.correction * change);
   sources.length_mm = numerical.length_mm;
 }
 

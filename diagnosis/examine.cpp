@@ -27,6 +27,7 @@ void tell(const ExamineOptions& options, const std::string& what) {
 
 void measure_mesh(const Subject& subject, const simulation::Model& model, const calibration::Fit& fit,
                   const ExamineOptions& options, Findings& found) {
+  const std::optional<NumericalError> before = std::move(found.numerical);
   found.numerical.reset();
   found.numerical_failure.clear();
   if (!options.other_meshes) {
@@ -35,7 +36,7 @@ void measure_mesh(const Subject& subject, const simulation::Model& model, const 
   }
   tell(options, "two other meshes");
   try {
-    found.numerical = measure_numerical_error(subject.fitted, model, fit, &subject.whole);
+    found.numerical = measure_numerical_error(subject.fitted, model, fit, before ? &*before : nullptr);
   } catch (const NumericalFailure& failure) {
     found.numerical_failure = failure.what();
   }
@@ -83,6 +84,9 @@ void fit_base(const Subject& subject, calibration::Evaluator& evaluator, const E
     const calibration::Fit first = std::move(found.base.fit);
     fit_from(subject, evaluator, parameters, first.u, &first.prediction.solution, options, found);
   }
+  if (found.numerical)
+    for (const Eigen::VectorXd& change : measure_unfitted_error(subject.whole, *found.numerical))
+      found.sources.unfitted_mean_mm.push_back(options.tolerances.correction * change);
   found.model = parameters.model(found.base.fit.u);
   found.free = parameters.names();
   found.unseen.clear();
@@ -111,7 +115,8 @@ void settle_named(const Subject& subject, const ExamineOptions& options, Finding
     for (Refit& refit : found.refits)
       if (refit.effect == names[n] && refit.finished) {
         tell(options, "interval of " + refit.effect);
-        settle(subject.fitted, found.sources, found.numerical.has_value(), options.tolerances, found.metric, refit);
+        settle(subject.fitted, found.sources, found.numerical ? &*found.numerical : nullptr, options.tolerances,
+               found.metric, refit);
       }
 }
 

@@ -25,12 +25,12 @@ struct Errors {
   Whitening whitening;
 };
 
-Errors errors_with(const calibration::Scene& scene, const ErrorSources& sources, bool other_mesh,
+Errors errors_with(const calibration::Scene& scene, const ErrorSources& sources, const NumericalError* base,
                    const Tolerances& tolerances, const Refit& refit) {
   Errors errors{without_tolerance_for(refit.effect, sources), {}};
-  if (other_mesh) {
+  if (base != nullptr) {
     try {
-      set_numerical(measure_numerical_error(scene, refit.model, refit.fit.fit), tolerances, errors.sources);
+      set_numerical(measure_numerical_error(scene, refit.model, refit.fit.fit, base), tolerances, errors.sources);
     } catch (const NumericalFailure&) {
       // No other mesh carries this model: what was measured without the effect has to do.
     }
@@ -128,9 +128,9 @@ FittedParameter profiled(const calibration::Scene& scene, const Metric& metric, 
 
 }  // namespace
 
-void settle(const calibration::Scene& scene, const ErrorSources& sources, bool other_mesh, const Tolerances& tolerances,
-            const Metric& metric, Refit& refit) {
-  const Errors errors = errors_with(scene, sources, other_mesh, tolerances, refit);
+void settle(const calibration::Scene& scene, const ErrorSources& sources, const NumericalError* numerical,
+            const Tolerances& tolerances, const Metric& metric, Refit& refit) {
+  const Errors errors = errors_with(scene, sources, numerical, tolerances, refit);
   Metric now = metric;
   now.whitening = &errors.whitening, now.mean_mm = errors.sources.mean_mm;
   const FreeParameters parameters(refit.model);

@@ -13,9 +13,9 @@ namespace supine::diagnosis {
 /// cut at the range. It need not lie evenly, and may be open to the end where ever more of the effect changes nothing.
 /// Tissue effects are widened by Tolerances::effect_form, sources of error by their tolerance, in quadrature. Other
 /// parameters, and effects of several strengths, get linear_intervals().
-/// @param sources     of the base model's examination
-/// @param other_mesh  whether the mesh's error is to be measured
-void settle(const calibration::Scene& scene, const ErrorSources& sources, bool other_mesh, const Tolerances& tolerances,
-            const Metric& metric, Refit& refit);
+/// @param sources    of the base model's examination
+/// @param numerical  the mesh's error there; nullptr where it is not to be measured
+void settle(const calibration::Scene& scene, const ErrorSources& sources, const NumericalError* numerical,
+            const Tolerances& tolerances, const Metric& metric, Refit& refit);
 
 }  // namespace supine::diagnosis

@@ -36,11 +36,22 @@ simulation::ChainSolution on_quadratic(const meshing::TetMesh& quadratic, const 
   simulation::ChainSolution start;
   start.prone = on_quadratic(quadratic, linear.prone);
   start.X = on_quadratic(quadratic, linear.X);
-  for (const simulation::PoseSolution& pose : linear.poses) {
-    start.poses.push_back({});
-    start.poses.back().name = pose.name;
-    start.poses.back().x = on_quadratic(quadratic, pose.x);
-  }
+  for (const simulation::PoseSolution& pose : linear.poses)
+    start.poses.push_back({.name = pose.name, .x = on_quadratic(quadratic, pose.x)});
+  return start;
+}
+
+/// The quadratic solution that was found near, moved as the linear one moved since.
+simulation::ChainSolution followed(const meshing::TetMesh& quadratic, const NumericalError& near,
+                                   const simulation::ChainSolution& linear) {
+  const auto moved = [&quadratic](const Points& from, const Points& then, const Points& now) {
+    return Points(from + on_quadratic(quadratic, now - then));
+  };
+  simulation::ChainSolution start = near.finer;
+  start.prone = moved(start.prone, near.given.prone, linear.prone);
+  start.X = moved(start.X, near.given.X, linear.X);
+  for (std::size_t p = 0; p < start.poses.size(); ++p)
+    start.poses[p].x = moved(start.poses[p].x, near.given.poses[p].x, linear.poses[p].x);
   return start;
 }
 
@@ -48,7 +59,7 @@ simulation::ChainSolution on_quadratic(const meshing::TetMesh& quadratic, const 
 simulation::SolveOptions enough() {
   simulation::SolveOptions options;
   options.step_tolerance_mm = 1e-3;
-  options.residual_tolerance = 1e-5;
+  options.residual_tolerance = 1e-3;
   return options;
 }
 
@@ -90,38 +101,22 @@ std::vector<Eigen::VectorXd> change_of_others(std::size_t first, const calibrati
   return all;
 }
 
-/// Change of quadratic elements for poses that are not fitted, from their solution for those that are. They only
-/// confirm: a pose that does not come out in a few steps is left as it is.
-std::vector<Eigen::VectorXd> change_of_unfitted(const calibration::Scene& whole, std::size_t fitted,
-                                                const meshing::TetMesh& mesh, const simulation::Model& model,
-                                                simulation::ChainSolution start) {
-  simulation::SolveOptions few = enough();
-  few.max_iterations = 12;
-  few.smallest_load_step = 1;
-  try {
-    const calibration::Prediction given = calibration::Evaluator(whole, model).predict(model);
-    const simulation::ChainSolution there = on_quadratic(mesh, given.solution);
-    start.poses.insert(start.poses.end(), there.poses.begin() + static_cast<std::ptrdiff_t>(fitted), there.poses.end());
-    return change_of_others(fitted, given, predicted_on(whole, mesh, model, &start, few));
-  } catch (const NumericalFailure&) {
-    return {};
-  }
-}
-
-/// Fills finer_mm and unfitted_mm.
+/// Fills finer_mm and what it comes from.
+/// @param near  or nullptr
 void measure_finer(const calibration::Scene& scene, const simulation::Model& model, const calibration::Fit& fit,
-                   const calibration::Scene* whole, NumericalError& result) {
+                   const NumericalError* near, NumericalError& result) {
   if (scene.mesh->order() != 1) {
     const meshing::TetMesh mesh = other_mesh(*scene.mesh, *scene.anatomy, edge_share);
     result.finer_mm = change_of(fit.residuals, predicted_on(scene, mesh, model, nullptr, enough()));
     return;
   }
   const meshing::TetMesh mesh = meshing::to_quadratic(*scene.mesh);
-  const simulation::ChainSolution start = on_quadratic(mesh, fit.prediction.solution);
-  const calibration::Prediction finer = predicted_on(scene, mesh, model, &start, enough());
+  const simulation::ChainSolution& linear = fit.prediction.solution;
+  const bool known = near != nullptr && near->finer.X.rows() == mesh.points.rows();
+  const simulation::ChainSolution start = known ? followed(mesh, *near, linear) : on_quadratic(mesh, linear);
+  calibration::Prediction finer = predicted_on(scene, mesh, model, &start, enough());
   result.finer_mm = change_of(fit.residuals, finer);
-  if (whole != nullptr && whole->measurements.size() > scene.measurements.size())
-    result.unfitted_mm = change_of_unfitted(*whole, scene.measurements.size(), mesh, model, finer.solution);
+  result.model = model, result.given = linear, result.finer = std::move(finer.solution);
 }
 
 /// Root of a field of squares as seen around each point, over its root mean square: edges and folds err by more than
@@ -170,7 +165,7 @@ double correlation_length_mm(const Residuals& residuals, const Eigen::VectorXd& 
 }
 
 NumericalError measure_numerical_error(const calibration::Scene& scene, const simulation::Model& model,
-                                       const calibration::Fit& fit, const calibration::Scene* whole) {
+                                       const calibration::Fit& fit, const NumericalError* near) {
   NumericalError result;
   result.finer_doubt = scene.mesh->order() == 1 ? order_doubt : 1;
   result.finer_mm = result.coarser_mm = Eigen::VectorXd::Zero(fit.residuals.size());
@@ -179,7 +174,7 @@ NumericalError measure_numerical_error(const calibration::Scene& scene, const si
   for (int k = 0; k < 2; ++k) {
     try {
       if (k == 0)
-        measure_finer(scene, model, fit, whole, result);
+        measure_finer(scene, model, fit, near, result);
       else
         result.coarser_mm = change_of(
             fit.residuals,
@@ -201,6 +196,27 @@ NumericalError measure_numerical_error(const calibration::Scene& scene, const si
                      ((reason[0].empty() ? correlation_length_mm(fit.residuals, result.finer_mm) : 0) +
                       (reason[1].empty() ? correlation_length_mm(fit.residuals, result.coarser_mm) : 0));
   return result;
+}
+
+std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& whole, const NumericalError& fitted) {
+  const std::size_t count = fitted.finer.poses.size();
+  if (count == 0) return {};
+  // They only confirm: a pose that does not come out in a few steps is left as it is.
+  simulation::SolveOptions few = enough();
+  few.max_iterations = 10;
+  few.smallest_load_step = 1;
+  try {
+    const meshing::TetMesh mesh = meshing::to_quadratic(*whole.mesh);
+    const calibration::Prediction given = calibration::Evaluator(whole, fitted.model).predict(fitted.model);
+    simulation::ChainSolution start = fitted.finer;
+    for (std::size_t p = count; p < given.solution.poses.size(); ++p) {
+      const simulation::PoseSolution& pose = given.solution.poses[p];
+      start.poses.push_back({.name = pose.name, .x = start.X + on_quadratic(mesh, pose.x - given.solution.X)});
+    }
+    return change_of_others(count, given, predicted_on(whole, mesh, fitted.model, &start, few));
+  } catch (const NumericalFailure&) {
+    return {};
+  }
 }
 
 }  // namespace supine::diagnosis

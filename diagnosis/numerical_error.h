@@ -17,21 +17,26 @@ struct NumericalError {
   double spread_mm = 0;        ///< rms of finer_doubt × finer_mm and coarser_mm: what is left when finer_mm was added
   Eigen::VectorXd share;       ///< #R, of the spread at each point: what the places around it show; mean square 1
   double length_mm = 0;        ///< over which it is alike
-  /// Change of finer elements for every scan point of the measurements that are not fitted, in the order of the scene;
-  /// 0 where the point lies beyond the border. Empty when not asked for, for quadratic meshes, and where a pose does
-  /// not come out in a few steps.
-  std::vector<Eigen::VectorXd> unfitted_mm;
   std::vector<std::string> failed;  ///< why a mesh gave no answer; its column is zero and the other counts twice
+  /// Of linear elements: what finer_mm comes from, to start the next one from.
+  simulation::Model model;
+  simulation::ChainSolution given, finer;
 };
 
 /// Two other meshes, one solve each, side by side. Finer than linear tetrahedra are quadratic ones of the same shapes
 /// (nearly all of the error is in the order: at the true moduli of a computed breast they leave noise and a third of
 /// the change, docs/diagnosis.md), finer than quadratic ones a mesh refined at the skin's end; coarser_mesh
 /// (other_mesh.h).
-/// @param whole  the scene and, after its measurements, those that are not fitted; nullptr = these are not asked for
+/// @param near  of the same scene and a similar model, to start from; or nullptr
 /// @throws NumericalFailure  neither mesh gave an answer
 NumericalError measure_numerical_error(const calibration::Scene& scene, const simulation::Model& model,
-                                       const calibration::Fit& fit, const calibration::Scene* whole = nullptr);
+                                       const calibration::Fit& fit, const NumericalError* near = nullptr);
+
+/// Change of distance that finer elements make for every scan point of the measurements that are not fitted, in the
+/// order of the scene; 0 where the point lies beyond the border. Empty for quadratic meshes, and where a pose does not
+/// come out in a few steps.
+/// @param whole   the scene of @p fitted and, after its measurements, those that are not fitted
+std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& whole, const NumericalError& fitted);
 
 /// Length l of exp(−r/l) that fits the correlation of neighbours in @p field, a change over the residuals' points with
 /// or without a mean; between 5 and 60 mm.
