@@ -61,6 +61,20 @@ void FreeParameters::add(const std::string& name, const Setting& setting) {
   priors_.back() = Prior{start_[i], sd};
 }
 
+Eigen::VectorXd FreeParameters::prior_deviation(const Eigen::VectorXd& u) const {
+  Eigen::VectorXd deviation = Eigen::VectorXd::Zero(size());
+  for (Eigen::Index i = 0; i < size(); ++i)
+    if (const auto& prior = priors_[static_cast<std::size_t>(i)]) deviation[i] = (u[i] - prior->mean) / prior->sd;
+  return deviation;
+}
+
+Eigen::VectorXd FreeParameters::prior_information() const {
+  Eigen::VectorXd information = Eigen::VectorXd::Zero(size());
+  for (Eigen::Index i = 0; i < size(); ++i)
+    if (const auto& prior = priors_[static_cast<std::size_t>(i)]) information[i] = 1 / (prior->sd * prior->sd);
+  return information;
+}
+
 double FreeParameters::value(Eigen::Index i, double coordinate) const {
   const auto k = static_cast<std::size_t>(i);
   return log_[k] ? std::exp(coordinate) : coordinate * scale_[k];

@@ -37,6 +37,10 @@ class FreeParameters {
   const Eigen::VectorXd& upper() const { return upper_; }
   /// One per parameter; none where the model names no prior_sd.
   const std::vector<std::optional<Prior>>& priors() const { return priors_; }
+  /// (u − mean) / sd, 0 where there is no prior.
+  Eigen::VectorXd prior_deviation(const Eigen::VectorXd& u) const;
+  /// 1 / sd², 0 where there is no prior.
+  Eigen::VectorXd prior_information() const;
 
   double value(Eigen::Index i, double coordinate) const;
   double coordinate(Eigen::Index i, double value) const;

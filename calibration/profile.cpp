@@ -69,10 +69,7 @@ class ProfileEnd {
     double sum = 0;
     for (Eigen::Index i = 0; i < residuals.size(); ++i)
       sum += std::pow(robust_residual(residuals.distance_mm[i], options_.robust_mm), 2) / tau_squared_;
-    for (Eigen::Index j = 0; options_.use_priors && j < u.size(); ++j)
-      if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)])
-        sum += std::pow((u[j] - prior->mean) / prior->sd, 2);
-    return sum;
+    return sum + (options_.use_priors ? parameters_.prior_deviation(u).squaredNorm() : 0);
   }
 
   Evaluator& evaluator_;

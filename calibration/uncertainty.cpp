@@ -13,14 +13,6 @@ constexpr double quantile = 1.959964;
 
 double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
 
-Eigen::MatrixXd prior_information(const FreeParameters& parameters, bool use_priors) {
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(parameters.size(), parameters.size());
-  for (Eigen::Index i = 0; use_priors && i < parameters.size(); ++i)
-    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(i)])
-      information(i, i) = 1 / (prior->sd * prior->sd);
-  return information;
-}
-
 /// Information with a little added where there is none: along such a direction the variance becomes open_sd².
 struct Closed {
   Eigen::MatrixXd inverse, added;
@@ -55,7 +47,8 @@ Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_pri
   Uncertainty result;
   result.errors = fit_error_model(fit.residuals, j);
   result.effective_points = result.errors.effective_count(fit.residuals);
-  const Eigen::MatrixXd priors = prior_information(parameters, use_priors);
+  Eigen::MatrixXd priors = Eigen::MatrixXd::Zero(parameters.size(), parameters.size());
+  if (use_priors) priors.diagonal() = parameters.prior_information();
   const Eigen::MatrixXd data = precision * (j.transpose() * j);
   const Eigen::MatrixXd spread = precision * precision * weighted_product(result.errors, fit.residuals, j, j);
   const Closed closed(data + priors);

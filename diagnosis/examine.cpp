@@ -93,16 +93,17 @@ void fit_base(const Subject& subject, calibration::Evaluator& evaluator, const E
   found.candidates = find_candidates(evaluator, found.model, found.base.fit, found.unseen);
 }
 
-void judge_base(const RefitProblem& problem, Findings& found) {
+void judge_base(const Subject& subject, const RefitProblem& problem, Findings& found) {
+  const FreeParameters parameters(subject.model);
   const calibration::Fit& fit = found.base.fit;
   BaseFigures& f = found.figures;
   f.rms_mm = rms(fit.residuals.distance_mm);
-  f.held_out_rms_mm = rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope,
-                                                          prior_information(calibration::FreeParameters(found.model)),
-                                                          calibration::spatial_blocks(fit.residuals)));
+  f.held_out_rms_mm =
+      rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, parameters.prior_information(),
+                                          calibration::spatial_blocks(fit.residuals)));
   f.noise_mm = rms(found.sources.noise_mm);
   f.left = lack_of_fit(found.base, found.metric);
-  f.pose_rms_mm = other_pose_rms_mm(problem, found.model, found.base, calibration::FreeParameters(found.model));
+  f.pose_rms_mm = other_pose_rms_mm(problem, found.model, found.base, parameters);
   f.unfitted_poses = comparable_poses(problem);
 }
 
@@ -135,13 +136,8 @@ std::vector<std::string> worth_refitting(const ScoreTable& table, std::size_t co
 
 RefitProblem refit_problem(const Subject& subject, const Findings& found,
                            const std::function<void(const std::string&)>& progress) {
-  return {subject.fitted,
-          subject.whole,
-          &found.model,
-          &found.base,
-          &found.metric,
-          &found.sources,
-          std::log(found.whitening.effective_points()),
+  return {subject.fitted, subject.whole, &subject.model, &found.model,
+          &found.base,    &found.metric, &found.sources, std::log(found.whitening.effective_points()),
           progress};
 }
 
@@ -159,7 +155,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   tell(options, "scores");
   found->table = score_candidates(corrected, found->base.fit.linearisation.slope, found->candidates, found->whitening,
                                   options.seed);
-  judge_base(problem, *found);
+  judge_base(subject, problem, *found);
   const bool silent = !found->table.scores.empty() && found->table.scores.front().p_value >= options.rules.p_value &&
                       found->figures.left.p_value >= options.rules.lack_of_fit_p;
   if (!silent && options.refits > 0)

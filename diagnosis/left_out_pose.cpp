@@ -33,12 +33,10 @@ Eigen::VectorXd step_without_the_others(const calibration::Fit& fit, const FreeP
   const Eigen::VectorXd value = whitening.apply(kept.distance_mm + errors.mean_mm);
   const Eigen::MatrixXd slope = whitening.apply(fit.linearisation.slope(rows, Eigen::all));
   Eigen::MatrixXd information = slope.transpose() * slope;
-  Eigen::VectorXd gradient = slope.transpose() * value;
-  for (Eigen::Index j = 0; j < parameters.size(); ++j)
-    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(j)]) {
-      information(j, j) += 1 / (prior->sd * prior->sd);
-      gradient[j] += (fit.u[j] - prior->mean) / (prior->sd * prior->sd);
-    }
+  const Eigen::VectorXd priors = parameters.prior_information();
+  information.diagonal() += priors;
+  const Eigen::VectorXd gradient =
+      slope.transpose() * value + priors.cwiseSqrt().cwiseProduct(parameters.prior_deviation(fit.u));
   const Eigen::VectorXd step = -information.completeOrthogonalDecomposition().solve(gradient);
   return parameters.clamped(fit.u + step) - fit.u;
 }
@@ -57,7 +55,8 @@ std::vector<double> left_out_pose_rms_mm(const WeightedFit& fit, const FreeParam
       (residuals.pose[r] == pose ? own : others).push_back(static_cast<int>(r));
     if (own.empty() || others.empty()) continue;
     const Eigen::VectorXd step = step_without_the_others(fit.fit, parameters, sources, others);
-    const Eigen::VectorXd predicted = residuals.distance_mm(own) + fit.fit.linearisation.slope(own, Eigen::all) * step;
+    const Eigen::VectorXd predicted =
+        residuals.distance_mm(own) + sources.mean_mm(own) + fit.fit.linearisation.slope(own, Eigen::all) * step;
     all.push_back(std::sqrt(predicted.squaredNorm() / static_cast<double>(own.size())));
   }
   return all;

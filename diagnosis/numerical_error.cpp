@@ -203,16 +203,15 @@ std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& wh
   if (count == 0) return {};
   // They only confirm: a pose that does not come out in a few steps is left as it is.
   simulation::SolveOptions few = enough();
-  few.max_iterations = 10;
+  few.max_iterations = 16;
   few.smallest_load_step = 1;
   try {
     const meshing::TetMesh mesh = meshing::to_quadratic(*whole.mesh);
     const calibration::Prediction given = calibration::Evaluator(whole, fitted.model).predict(fitted.model);
     simulation::ChainSolution start = fitted.finer;
-    for (std::size_t p = count; p < given.solution.poses.size(); ++p) {
-      const simulation::PoseSolution& pose = given.solution.poses[p];
-      start.poses.push_back({.name = pose.name, .x = start.X + on_quadratic(mesh, pose.x - given.solution.X)});
-    }
+    // From the undeformed shape: what linear elements make of another pose is no closer, and may be inside out.
+    for (std::size_t p = count; p < given.solution.poses.size(); ++p)
+      start.poses.push_back({.name = given.solution.poses[p].name, .x = start.X});
     return change_of_others(count, given, predicted_on(whole, mesh, fitted.model, &start, few));
   } catch (const NumericalFailure&) {
     return {};

@@ -65,10 +65,10 @@ Eigen::VectorXd start_at(const FreeParameters& parameters, const FreeParameters&
 Job prepared(const RefitProblem& problem, const Candidate& candidate, const Score& score) {
   Job job;
   job.effect = candidate.effect;
-  job.model = *problem.model;
+  job.model = *problem.given;
   job.model.effects.push_back(free_setting(candidate.effect));
   job.parameters.emplace(job.model);
-  const FreeParameters base(*problem.model);
+  const FreeParameters base(*problem.given);
   job.freedom = score.freedom;
   std::vector<std::pair<std::string, double>> usual, step;
   bool differ = false;
@@ -157,7 +157,7 @@ Refit summary(const RefitProblem& problem, Job& job) {
   refit.bic = refit.gain - refit.freedom * problem.log_points - occam(job);
   refit.rms_mm = rms(fit.residuals.distance_mm);
   refit.held_out_rms_mm =
-      rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, prior_information(*job.parameters),
+      rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, job.parameters->prior_information(),
                                           calibration::spatial_blocks(fit.residuals)));
   refit.parameters = linear_intervals(job.effect, job.fit, *job.parameters, *problem.metric);
   refit.model = job.parameters->model(fit.u);
@@ -205,14 +205,6 @@ std::vector<FittedParameter> linear_intervals(const std::string& effect, const W
                     parameters.value(i, std::min(u + reach, parameters.upper()[i]))});
   }
   return list;
-}
-
-Eigen::VectorXd prior_information(const FreeParameters& parameters) {
-  Eigen::VectorXd information = Eigen::VectorXd::Zero(parameters.size());
-  for (Eigen::Index i = 0; i < information.size(); ++i)
-    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(i)])
-      information[i] = 1 / (prior->sd * prior->sd);
-  return information;
 }
 
 std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model) {

@@ -40,7 +40,8 @@ simulation::EffectSetting free_setting(const std::string& effect);
 struct RefitProblem {
   calibration::Scene scene;        ///< fitted poses
   calibration::Scene whole;        ///< and those that were not, after them
-  const simulation::Model* model;  ///< the base model at its optimum
+  const simulation::Model* given;  ///< the base model as it was given: where its priors stand
+  const simulation::Model* model;  ///< at its optimum
   const WeightedFit* base;
   const Metric* metric;
   const ErrorSources* sources;                       ///< of the metric
@@ -58,9 +59,6 @@ std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vect
 /// √max(1, misfit) to each side, cut at the range.
 std::vector<FittedParameter> linear_intervals(const std::string& effect, const WeightedFit& fit,
                                               const calibration::FreeParameters& parameters, const Metric& metric);
-
-/// Information of the priors, 0 where there is none.
-Eigen::VectorXd prior_information(const calibration::FreeParameters& parameters);
 
 /// Root mean square distance of each pose that is not fitted, the mesh's error taken away as far as it is known.
 std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model);

@@ -24,14 +24,10 @@ Rows rows_of(const calibration::Fit& fit, const FreeParameters& parameters, cons
   columns << fit.residuals.distance_mm + metric.mean_mm, fit.linearisation.slope;
   const Eigen::MatrixXd white = metric.whitening->apply(columns);
   const Eigen::Index n = white.rows(), p = parameters.size();
-  Rows rows{Eigen::VectorXd::Zero(n + p), Eigen::MatrixXd::Zero(n + p, p)};
-  rows.value.head(n) = white.col(0);
+  Rows rows{Eigen::VectorXd(n + p), Eigen::MatrixXd::Zero(n + p, p)};
+  rows.value << white.col(0), parameters.prior_deviation(fit.u);
   rows.slope.topRows(n) = white.rightCols(p);
-  for (Eigen::Index j = 0; j < p; ++j)
-    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(j)]) {
-      rows.value[n + j] = (fit.u[j] - prior->mean) / prior->sd;
-      rows.slope(n + j, j) = 1 / prior->sd;
-    }
+  rows.slope.bottomRows(p).diagonal() = parameters.prior_information().cwiseSqrt();
   return rows;
 }
 
@@ -39,10 +35,7 @@ Rows rows_of(const calibration::Fit& fit, const FreeParameters& parameters, cons
 void evaluate(const FreeParameters& parameters, const Metric& metric, WeightedFit& result) {
   const calibration::Fit& fit = result.fit;
   result.data = metric.whitening->apply(fit.residuals.distance_mm + metric.mean_mm).squaredNorm();
-  result.objective = result.data;
-  for (Eigen::Index j = 0; j < parameters.size(); ++j)
-    if (const auto& prior = parameters.priors()[static_cast<std::size_t>(j)])
-      result.objective += std::pow((fit.u[j] - prior->mean) / prior->sd, 2);
+  result.objective = result.data + parameters.prior_deviation(fit.u).squaredNorm();
 }
 
 /// F at given coordinates, without its slopes.

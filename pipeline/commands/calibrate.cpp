@@ -216,9 +216,8 @@ class CalibrateTool : public Tool {
     const auto& residuals = result.fit.residuals;
     const auto as_list = [](const Eigen::VectorXd& d) { return std::vector<double>(d.begin(), d.end()); };
     result.in_sample = calibration::figures_of(as_list(residuals.distance_mm));
-    Eigen::VectorXd priors = Eigen::VectorXd::Zero(parameters.size());
-    for (Eigen::Index i = 0; options.use_priors && i < priors.size(); ++i)
-      if (const auto& prior = parameters.priors()[static_cast<std::size_t>(i)]) priors[i] = 1 / (prior->sd * prior->sd);
+    Eigen::VectorXd priors = parameters.prior_information();
+    if (!options.use_priors) priors.setZero();
     result.held_out_blocks = calibration::figures_of(as_list(calibration::held_out_distances(
         residuals, result.fit.linearisation.slope, priors, calibration::spatial_blocks(residuals))));
     if (measured_->held_out.empty()) return;

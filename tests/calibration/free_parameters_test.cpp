@@ -60,6 +60,13 @@ TEST(FreeParameters, PriorOfAPositiveParameterIsLogNormal) {
   EXPECT_NEAR(parameters.priors()[0]->sd, std::log(1 + 0.4 / 0.5), 1e-15);
   EXPECT_NEAR(parameters.priors()[1]->sd, 1, 1e-15);  // scaled by prior_sd
   EXPECT_FALSE(parameters.priors()[2]);
+  Eigen::VectorXd u = parameters.start();
+  u[0] += 2 * parameters.priors()[0]->sd;
+  u[2] += 0.1;
+  EXPECT_NEAR(parameters.prior_deviation(u)[0], 2, 1e-12);
+  EXPECT_EQ(parameters.prior_deviation(u)[2], 0);
+  EXPECT_NEAR(parameters.prior_information()[0], std::pow(parameters.priors()[0]->sd, -2), 1e-12);
+  EXPECT_EQ(parameters.prior_information()[2], 0);
 }
 
 TEST(FreeParameters, KnowsItsBounds) {

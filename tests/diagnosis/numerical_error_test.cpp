@@ -81,6 +81,33 @@ TEST(NumericalError, QuadraticElementsTakeAwayWhatLinearOnesErr) {
     EXPECT_NEAR(unfitted[0][f.fit.residuals.point[r]], error.finer_mm[r], 0.01);
 }
 
+TEST(NumericalError, DoesNotDependOnWhereTheSolutionIsLookedForFrom) {
+  const LinearOfQuadratic f;
+  simulation::Model stiffer = twin_truth();
+  stiffer.breast.young_modulus_kpa.value *= 1.3;
+  calibration::Evaluator evaluator(f.scene, stiffer);
+  const calibration::FreeParameters parameters(stiffer);
+  calibration::FitOptions options;
+  options.noise_mm = {0.05};
+  const calibration::Fit fit = calibration::evaluate_fit(evaluator, parameters, options, parameters.start());
+  const NumericalError near = measure_numerical_error(f.scene, twin_truth(), f.fit);
+  const NumericalError alone = measure_numerical_error(f.scene, stiffer, fit);
+  const NumericalError followed = measure_numerical_error(f.scene, stiffer, fit, &near);
+  ASSERT_EQ(fit.residuals.size(), f.fit.residuals.size());
+  EXPECT_GT(rms(alone.finer_mm - near.finer_mm), 0.02) << "the error differs";
+  EXPECT_LT(rms(alone.finer_mm - followed.finer_mm), 0.002);
+}
+
+TEST(NumericalError, LeavesScansAloneWhosePoseDoesNotComeOut) {
+  const LinearOfQuadratic f;
+  calibration::Scene whole = f.scene;
+  whole.measurements.push_back(f.scene.measurements[0]);
+  NumericalError error = measure_numerical_error(f.scene, twin_truth(), f.fit);
+  error.model.breast.young_modulus_kpa.value = 0.01;  // too soft to carry itself
+  error.model.skin.young_modulus_kpa.value = 0.01;
+  EXPECT_TRUE(measure_unfitted_error(whole, error).empty());
+}
+
 TEST(NumericalError, SaysWhyNeitherMeshGaveAnAnswer) {
   const Fitted f;
   meshing::TetMesh crossed = f.twin.mesh;  // its nipple pulled through its muscle: no surface to fill anew

@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <numbers>
+#include <random>
 #include <tuple>
 #include <vector>
 
@@ -36,6 +37,10 @@ inline Surface grid(int nu, int nv, bool wrap_u, bool wrap_v, const Map& map) {
       s.triangles.row(2 * (i * nv + j) + 1) << a, c, d;
     }
   return s;
+}
+
+inline Surface open_sheet() {
+  return grid(12, 9, false, false, [](double u, double v) { return Eigen::Vector3d(12 * u, 9 * v, 0); });
 }
 
 inline Surface torus(double ring_mm, double tube_mm) {
@@ -124,6 +129,14 @@ inline Surface together(const Surface& a, const Surface& b) {
 
 inline Surface inside_out(Surface s) {
   s.triangles.col(1).swap(s.triangles.col(2));
+  return s;
+}
+
+/// Every coordinate moved by up to @p by_mm.
+inline Surface shaken(Surface s, double by_mm, unsigned seed) {
+  std::mt19937 random(seed);
+  for (Eigen::Index i = 0; i < s.points.size(); ++i)
+    s.points.data()[i] += by_mm * (2.0 * static_cast<double>(random()) / std::mt19937::max() - 1);
   return s;
 }
 
