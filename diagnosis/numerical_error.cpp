@@ -200,7 +200,7 @@ NumericalError measure_numerical_error(const calibration::Scene& scene, const si
 
 std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& whole, const NumericalError& fitted) {
   const std::size_t count = fitted.finer.poses.size();
-  if (count == 0) return {};
+  if (count == 0 || whole.measurements.size() == count) return {};
   // They only confirm: a pose that does not come out in a few steps is left as it is.
   simulation::SolveOptions few = enough();
   few.max_iterations = 16;

@@ -77,6 +77,7 @@ TEST(NumericalError, QuadraticElementsTakeAwayWhatLinearOnesErr) {
   EXPECT_LT(rms(d + error.finer_mm), 0.08) << "of which 0.05 mm are noise";
   const std::vector<Eigen::VectorXd> unfitted = measure_unfitted_error(whole, error);
   ASSERT_EQ(unfitted.size(), 1u);
+  EXPECT_TRUE(measure_unfitted_error(f.scene, error).empty()) << "every scan is fitted";
   for (Eigen::Index r = 0; r < d.size(); r += 7)
     EXPECT_NEAR(unfitted[0][f.fit.residuals.point[r]], error.finer_mm[r], 0.01);
 }
