@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Blind benchmark: makes cases with a sealed answer, diagnoses each from its case folder alone, scores.
 
-    bench/hidden.py WORK --bin build/bin --cases 60 [--seed 1] [--jobs 2] [--no-tilt] [--only odd|even] [--again]
+    bench/hidden.py WORK --bin build/bin --cases 60 [--first 1] [--seed 1] [--jobs 2] [--no-tilt] [--only odd|even]
+                    [--again]
 
 WORK/cases/case-001 ... what the tools read; WORK/answers/case-001.json the answers; WORK/out/case-001 what the tools
 wrote. A second call goes on where the first stopped. --again diagnoses the cases that are there once more into
@@ -147,6 +148,7 @@ def arguments():
     parser.add_argument("work", type=pathlib.Path)
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/bin"))
     parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--first", type=int, default=1, help="number of the first case to run, up to --cases")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2, help="cases side by side, one thread each")
     parser.add_argument("--no-tilt", action="store_true", help="the supine scan alone")
@@ -162,7 +164,7 @@ def main():
     options.bin = options.bin.resolve()
     for folder in ("cases", "answers", "out", "logs"):
         (work / folder).mkdir(parents=True, exist_ok=True)
-    cases = [(name, words) for name, words in plan(options.cases, options.seed)
+    cases = [(name, words) for name, words in plan(options.cases, options.seed)[options.first - 1:]
              if options.only is None or int(words[1]) % 2 == (options.only == "odd")]
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         waiting = [pool.submit(one_case, work, options, name, words) for name, words in cases]

@@ -3,9 +3,11 @@
 """Scores diagnoses against sealed answers: confusion matrix and rates with 95 % Wilson intervals.
 
     bench/hidden_score.py ANSWERS RESULTS [-o SCORE]
+    bench/hidden_score.py SCORE.jsonl [MORE.jsonl ...] [-o SCORE]
 
 ANSWERS/NAME.json is what supine-phantom sealed, RESULTS/NAME/diagnosis.json what any tool said (docs/hidden.md has the
-keys it needs). Prints the tables; with -o writes SCORE.md, SCORE.csv (a row per case) and SCORE.json.
+keys it needs). Prints the tables; with -o writes SCORE.md, SCORE.csv (a row per case), SCORE.json and SCORE.jsonl (all
+that is scored of each case). The second form scores cases that were scored before, so that runs can be put together.
 """
 
 import argparse
@@ -213,6 +215,8 @@ def write(cases, target):
                               case["intervals"])
             writer.writerow([case["case"], case["seed"], case["kind"], "+".join(case["causes"]), case["verdict"],
                              "+".join(case["missing"]), outcome(case), case["power"], case["p"], spans])
+    lines = "".join(json.dumps(case) + "\n" for case in cases)
+    pathlib.Path(f"{target}.jsonl").write_text(lines, encoding="utf-8")
     document = {"cases": len(cases), "confusion": confusion(cases),
                 "rates": [{"rate": what, "hits": hits, "of": total, "interval95": wilson(hits, total)}
                           for what, hits, total in rates(cases)]}
@@ -220,22 +224,41 @@ def write(cases, target):
     pathlib.Path(f"{target}.md").write_text(text_of(cases), encoding="utf-8")
 
 
-def report(answers, results, target=None):
-    cases = score(answers, results)
-    if not cases:
-        raise SystemExit(f"no diagnosis in {results} for any answer in {answers}")
+def scored_before(files):
+    """Cases of earlier scores; of a case in several the last."""
+    cases = {}
+    for file in files:
+        for line in file.read_text(encoding="utf-8").splitlines():
+            case = json.loads(line)
+            cases[case["seed"], case["case"]] = case
+    return [cases[key] for key in sorted(cases)]
+
+
+def tell(cases, target):
     if target is not None:
         write(cases, target)
     print(text_of(cases))
 
 
+def report(answers, results, target=None):
+    cases = score(answers, results)
+    if not cases:
+        raise SystemExit(f"no diagnosis in {results} for any answer in {answers}")
+    tell(cases, target)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("answers", type=pathlib.Path)
-    parser.add_argument("results", type=pathlib.Path)
-    parser.add_argument("-o", dest="target", type=pathlib.Path, help="write SCORE.md, .csv and .json")
+    parser.add_argument("paths", type=pathlib.Path, nargs="+", metavar="PATH",
+                        help="ANSWERS RESULTS, or SCORE.jsonl ...")
+    parser.add_argument("-o", dest="target", type=pathlib.Path, help="write SCORE.md, .csv, .json and .jsonl")
     options = parser.parse_args()
-    report(options.answers, options.results, options.target)
+    if all(path.is_file() for path in options.paths):
+        tell(scored_before(options.paths), options.target)
+    elif len(options.paths) == 2:
+        report(*options.paths, options.target)
+    else:
+        parser.error("two folders, or files that -o wrote")
 
 
 if __name__ == "__main__":

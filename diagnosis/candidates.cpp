@@ -32,7 +32,7 @@ std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const 
   std::vector<Candidate> candidates;
   for (const Effect* effect : simulation::catalogue()) {
     if (has(model, *effect)) continue;
-    Candidate candidate{effect->name(), {}, Eigen::MatrixXd(fit.residuals.size(), 0)};
+    Candidate candidate{effect->name(), {}, Eigen::MatrixXd(fit.residuals.size(), 0), {}};
     for (const Parameter& row : effect->parameters()) {
       const std::string name = simulation::parameter_name(*effect, row);
       const Eigen::VectorXd slope =

@@ -20,22 +20,6 @@ bool improves(double held_out_mm, const BaseFigures& base, const VerdictRules& r
   return before > 0 && std::pow(held_out_mm, 2) - noise <= (1 - rules.excess_share) * before;
 }
 
-/// Over poses predicted without themselves.
-double pose_rms(const std::vector<double>& poses) {
-  double sum = 0;
-  for (const double p : poses) sum += p * p;
-  return std::sqrt(sum / static_cast<double>(poses.size()));
-}
-
-bool comes_near(const Refit& refit, const Refit& best, double misfit, const VerdictRules& rules) {
-  const bool near = best.bic - refit.bic < rules.bic * std::max(1.0, misfit);
-  if (refit.pose_rms_mm.empty() || refit.pose_rms_mm.size() != best.pose_rms_mm.size()) return near;
-  const double own = pose_rms(refit.pose_rms_mm), its = pose_rms(best.pose_rms_mm);
-  // A pose predicted without itself judges both: it can tell apart what the fitted one cannot, and bring back what
-  // the fitted one had put aside too surely.
-  return near ? own < (1 + rules.pose_share) * its : own < its;
-}
-
 double p_of_effect(const ScoreTable& table, const std::string& effect) {
   for (const Score& score : table.scores)
     if (score.effect == effect) return score.p_value;
@@ -48,51 +32,85 @@ double p_of(const ScoreTable& table) {
   return p;
 }
 
-/// Share of what poses predicted without themselves have above the noise that the refit takes away, in squares; none
-/// without such a pose. A scan that lies elsewhere says nothing of where one that was not fitted lies.
-std::optional<double> pose_fall(const Refit& refit, const BaseFigures& base) {
-  const std::size_t silent = refit.effect == "misregistration" ? base.unfitted_poses : 0;
-  if (refit.pose_rms_mm.size() != base.pose_rms_mm.size() || base.pose_rms_mm.size() <= silent) return {};
-  const auto rms_of = [silent](const std::vector<double>& poses) {
-    return pose_rms({poses.begin() + static_cast<std::ptrdiff_t>(silent), poses.end()});
+/// How many poses that are not fitted judge the refit. A scan that lies elsewhere says nothing of where another lies.
+std::size_t unfitted_judges(const Refit& refit, const BaseFigures& base) {
+  const bool seen = refit.pose_rms_mm.size() == base.pose_rms_mm.size() && refit.effect != "misregistration";
+  return seen ? base.unfitted_poses : 0;
+}
+
+/// Share of what some of the poses predicted without themselves have above the noise that the refit takes away, in
+/// squares; none without such a pose.
+std::optional<double> fall(const Refit& refit, const BaseFigures& base, std::size_t first, std::size_t end) {
+  if (refit.pose_rms_mm.size() != base.pose_rms_mm.size() || end <= first) return {};
+  const auto excess = [&](const std::vector<double>& poses) {
+    double sum = 0;
+    for (std::size_t i = first; i < end; ++i) sum += poses[i] * poses[i] - base.noise_mm * base.noise_mm;
+    return sum / static_cast<double>(end - first);
   };
-  const double noise = base.noise_mm * base.noise_mm, before = std::pow(rms_of(base.pose_rms_mm), 2) - noise;
-  const double after = std::pow(rms_of(refit.pose_rms_mm), 2) - noise;
-  return (before - after) / std::max(before, 0.01 * noise);
+  const double before = excess(base.pose_rms_mm), after = excess(refit.pose_rms_mm);
+  return (before - after) / std::max(before, 0.01 * base.noise_mm * base.noise_mm);
 }
 
-/// Whether the p of the effect is proof enough: held-out blocks of skin cannot show what lies under one block alone.
-bool is_sure(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
-  if (p_of_effect(table, refit.effect) > rules.sure_p) return false;
-  const std::optional<double> fall = pose_fall(refit, base);
-  if (!fall) return refit.bic >= rules.bic;
-  return refit.bic >= rules.pose_bic &&
-         *fall >= (refit.bic < rules.bic ? rules.weak_excess_share : rules.pose_excess_share);
+std::optional<double> fall_of_left_out(const Refit& refit, const BaseFigures& base) {
+  return fall(refit, base, base.unfitted_poses, base.pose_rms_mm.size());
 }
 
-/// Whether skin that was not fitted shows it: blocks of the fitted scan, and another pose where there is one.
-bool is_confirmed(const Refit& refit, const BaseFigures& base, const VerdictRules& rules) {
-  return refit.bic >= rules.bic && improves(refit.held_out_rms_mm, base, rules) &&
-         pose_fall(refit, base).value_or(1) >= rules.pose_excess_share;
+/// What poses that were not fitted say for or against it: their gain, and nothing for it where they are off by more
+/// with it (then it is for the small that a larger error is forgiven); for it no more than twice what the fitted one
+/// says, because less is known of their errors.
+double say_of_unfitted(const Refit& refit, const BaseFigures& base) {
+  const std::size_t judges = unfitted_judges(refit, base);
+  if (judges == 0) return 0;
+  const bool further_off = fall(refit, base, 0, judges).value_or(0) <= 0;
+  return std::min(refit.pose_gain, further_off ? 0.0 : 2 * std::max(refit.bic, 0.0));
 }
 
-/// What counts, best first, and what comes near the best of it whether it would count by itself or not.
-std::vector<const Refit*> counting(const ScoreTable& table, const std::vector<Refit>& refits,
-                                   const std::vector<LackOfFit>& left, const BaseFigures& base,
-                                   const VerdictRules& rules) {
-  const auto counts = [&](const Refit& refit) {
-    // The model as it is has b = 0: what does not stand out from that either is not named.
-    return refit.finished && (is_confirmed(refit, base, rules) || is_sure(refit, table, base, rules));
-  };
-  std::vector<const Refit*> good;
+/// b with it.
+double evidence(const Refit& refit, const BaseFigures& base) { return refit.bic + say_of_unfitted(refit, base); }
+
+/// Whether poses predicted without themselves bear it out, where there are any.
+bool is_borne_out(const Refit& refit, const BaseFigures& base, const VerdictRules& rules) {
+  if (say_of_unfitted(refit, base) < 0 && evidence(refit, base) < rules.strong_bic) return false;
+  const double share = refit.bic < rules.bic ? rules.weak_excess_share : rules.pose_excess_share;
+  return fall_of_left_out(refit, base).value_or(1) >= share;
+}
+
+/// Whether any pose predicted without itself judges it.
+bool has_judges(const Refit& refit, const BaseFigures& base) {
+  return unfitted_judges(refit, base) > 0 || fall_of_left_out(refit, base).has_value();
+}
+
+/// Whether the refit stands out from the model as it is (b = 0), and what was not fitted shows it: blocks of skin, or
+/// where its own p is proof enough, because blocks cannot show what lies under one of them alone, another pose.
+bool counts(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
+  if (!refit.finished || !is_borne_out(refit, base, rules)) return false;
+  if (refit.bic >= rules.bic && evidence(refit, base) >= rules.bic &&
+      (improves(refit.held_out_rms_mm, base, rules) || p_of_effect(table, refit.effect) <= rules.sure_p))
+    return true;
+  const bool left_out_show_it = fall_of_left_out(refit, base).has_value();
+  return p_of_effect(table, refit.effect) <= rules.sure_p && has_judges(refit, base) && refit.bic >= rules.pose_bic &&
+         (left_out_show_it || evidence(refit, base) >= rules.bic);
+}
+
+bool comes_near(const Refit& refit, const Refit& best, double misfit, const BaseFigures& base,
+                const VerdictRules& rules) {
+  return evidence(best, base) - evidence(refit, base) < rules.bic * std::max(1.0, misfit);
+}
+
+/// The best of what counts, and what comes near it whether it would count by itself or not.
+std::vector<const Refit*> best_and_rivals(const ScoreTable& table, const std::vector<Refit>& refits,
+                                          const std::vector<LackOfFit>& left, const BaseFigures& base,
+                                          const VerdictRules& rules) {
   const Refit* best = nullptr;
-  double misfit = 1;
-  for (std::size_t r = 0; r < refits.size(); ++r) {
-    const Refit& refit = refits[r];
-    if (best == nullptr && counts(refit)) best = &refit, misfit = left[r].misfit;
-    const bool near = best != nullptr && refit.finished && refit.bic > 0 && comes_near(refit, *best, misfit, rules);
-    if (&refit == best || (best != nullptr && counts(refit)) || near) good.push_back(&refit);
-  }
+  for (const Refit& refit : refits)
+    if (counts(refit, table, base, rules) && (best == nullptr || evidence(refit, base) > evidence(*best, base)))
+      best = &refit;
+  if (best == nullptr) return {};
+  std::vector<const Refit*> good = {best};
+  const double misfit = left[static_cast<std::size_t>(best - refits.data())].misfit;
+  for (const Refit& refit : refits)
+    if (&refit != best && refit.finished && refit.bic > 0 && comes_near(refit, *best, misfit, base, rules))
+      good.push_back(&refit);
   return good;
 }
 
@@ -163,7 +181,7 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
         fmt::format("errors of scan, registration and mesh alone score as high as the best effect (p {:.3f})", p);
     return result;
   }
-  const std::vector<const Refit*> good = counting(table, refits, left, base, rules);
+  const std::vector<const Refit*> good = best_and_rivals(table, refits, left, base, rules);
   if (good.empty()) {
     result.why = "no effect of the catalogue lowers the held-out error";
     if (!refits.empty() && refits.front().finished && refits.front().bic > rules.bic)
@@ -176,10 +194,10 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
   }
   const Refit& best = *good.front();
   result.left = left[static_cast<std::size_t>(&best - refits.data())];
-  for (const Refit* refit : good)
-    if (refit == &best || comes_near(*refit, best, result.left.misfit, rules)) result.missing.push_back(refit->effect);
-  const double fall = base.unfitted_poses > 0 ? pose_fall(best, base).value_or(1) : 1;
-  const bool elsewhere_too = fall >= rules.excess_share || result.left.p_value >= rules.lack_of_fit_p;
+  for (const Refit* refit : good) result.missing.push_back(refit->effect);
+  const double taken = fall(best, base, 0, unfitted_judges(best, base)).value_or(1);
+  const bool elsewhere_too = taken >= rules.excess_share || result.left.p_value >= rules.lack_of_fit_p ||
+                             result.left.misfit < rules.slight_misfit;
   if (real(result.left) || !elsewhere_too) {
     result.verdict = Verdict::unexplained;
     result.missing = {best.effect};
@@ -187,7 +205,7 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
                              result.left.misfit, result.left.p_value);
     if (!elsewhere_too)
       result.why +=
-          fmt::format(" and takes away {:.0f} % of what scans that were not fitted have above noise", 100 * fall);
+          fmt::format(" and takes away {:.0f} % of what scans that were not fitted have above noise", 100 * taken);
     return result;
   }
   std::stable_partition(result.missing.begin(), result.missing.end(), is_measurement_effect);

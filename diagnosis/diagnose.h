@@ -25,13 +25,13 @@ struct VerdictRules {
   double bic = 6;  ///< least b of what is named; candidates within this of the best cannot be told from it, times the
                    ///< misfit left
   double sure_p = 0.01;             ///< of an effect that counts by itself, whatever the held-out blocks show
-  double pose_bic = 2;              ///< b that is enough with sure_p where an unfitted pose confirms it
-  double pose_excess_share = 0.05;  ///< that pose must lose this share of what it has above the noise, in squares
+  double pose_bic = 2;              ///< least b in the fitted pose where another one says the rest
+  double pose_excess_share = 0.05;  ///< a fitted pose left out must lose this share of its excess, in squares
   double weak_excess_share = 0.2;   ///< this where b is under `bic`
-  double strong_bic = 20;           ///< b that something real is behind, whatever it is
-  double pose_share = 0.05;         ///< rivals too: those that predict an unfitted pose better, or within this share
+  double strong_bic = 20;           ///< evidence that something real is behind, whatever it is
   double lack_of_fit_p = 0.01;      ///< what is left after the best is more than errors; a pose that was not fitted
                                     ///< must then lose excess_share
+  double slight_misfit = 1.1;       ///< unless it is this small on the mean
   double lack_of_fit_misfit = 1.6;  ///< and this many times what errors would leave on the mean
 };
 
@@ -59,13 +59,15 @@ struct Diagnosis {
 };
 
 /// nothing_missing  no score that chance would not give (p), or nothing that lowers the held-out error
-/// missing          one refit counts and no other comes near. A refit counts that beats its penalty by `bic`,
-///                  lowers the held-out error and, where there is one, that of a pose that was not fitted. Blocks of
-///                  skin that are predicted without themselves cannot show what lies under one of them alone, so
-///                  instead of these its own p may be below sure_p
-/// ambiguous        several do, measurement effects first
+/// missing          one refit counts and no other comes near. Its evidence is b plus what poses that were not fitted
+///                  gain with it (Refit::pose_gain; at most twice b for it, nothing where they end further off, in
+///                  full against it). It counts with evidence of `bic` or more if the held-out error falls or its own
+///                  p is below sure_p, because blocks of skin predicted without themselves cannot show what lies under
+///                  one of them alone. Where such poses speak against it the evidence must be `strong_bic`; fitted
+///                  poses left out, where several are fitted, have to fall too
+/// ambiguous        others have evidence within `bic` of the best, measurement effects first
 /// unexplained      nothing counts, though the residual is real or the best b is at least `strong_bic`; or the best
-///                  leaves much of a real residual, or any of it and most of what a pose that was not fitted has
+///                  leaves much of a real residual, or some of it and most of what a pose that was not fitted has
 /// @param refits  best first; of them only finished ones count
 /// @param left    lack of fit of each refit
 Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, const std::vector<LackOfFit>& left,

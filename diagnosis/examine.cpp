@@ -84,16 +84,14 @@ void fit_base(const Subject& subject, calibration::Evaluator& evaluator, const E
     const calibration::Fit first = std::move(found.base.fit);
     fit_from(subject, evaluator, parameters, first.u, &first.prediction.solution, options, found);
   }
-  if (found.numerical)
-    for (const Eigen::VectorXd& change : measure_unfitted_error(subject.whole, *found.numerical))
-      found.sources.unfitted_mean_mm.push_back(options.tolerances.correction * change);
+  tell(options, "catalogue");
   found.model = parameters.model(found.base.fit.u);
   found.free = parameters.names();
   found.unseen.clear();
   found.candidates = find_candidates(evaluator, found.model, found.base.fit, found.unseen);
 }
 
-void judge_base(const Subject& subject, const RefitProblem& problem, Findings& found) {
+void judge_base(const Subject& subject, Findings& found) {
   const FreeParameters parameters(subject.model);
   const calibration::Fit& fit = found.base.fit;
   BaseFigures& f = found.figures;
@@ -103,8 +101,26 @@ void judge_base(const Subject& subject, const RefitProblem& problem, Findings& f
                                           calibration::spatial_blocks(fit.residuals)));
   f.noise_mm = rms(found.sources.noise_mm);
   f.left = lack_of_fit(found.base, found.metric);
-  f.pose_rms_mm = other_pose_rms_mm(problem, found.model, found.base, parameters);
-  f.unfitted_poses = comparable_poses(problem);
+}
+
+/// Whether chance gives what is seen: nothing is refitted then.
+bool is_quiet(const Findings& found, const VerdictRules& rules) {
+  return !found.table.scores.empty() && found.table.scores.front().p_value >= rules.p_value &&
+         found.figures.left.p_value >= rules.lack_of_fit_p;
+}
+
+/// @param corrected  by what finer elements change there
+void judge_by_other_poses(const Subject& subject, const ExamineOptions& options, bool corrected, Findings& found) {
+  if (corrected && found.numerical) {
+    tell(options, "finer mesh in poses that are not fitted");
+    for (const Eigen::VectorXd& change : measure_unfitted_error(subject.whole, *found.numerical))
+      found.sources.unfitted_mean_mm.push_back(options.tolerances.correction * change);
+  }
+  tell(options, "poses that are not fitted");
+  found.others = other_poses_of_base(subject.whole, FreeParameters(subject.model), found.base, found.sources,
+                                     found.metric, options.tolerances);
+  found.figures.pose_rms_mm = found.others.rms_mm();
+  found.figures.unfitted_poses = found.others.unfitted;
 }
 
 /// Sizes and intervals of what is named, with the mesh's error measured again where it is in the model.
@@ -136,8 +152,9 @@ std::vector<std::string> worth_refitting(const ScoreTable& table, std::size_t co
 
 RefitProblem refit_problem(const Subject& subject, const Findings& found,
                            const std::function<void(const std::string&)>& progress) {
-  return {subject.fitted, subject.whole, &subject.model, &found.model,
-          &found.base,    &found.metric, &found.sources, std::log(found.whitening.effective_points()),
+  return {subject.fitted, subject.whole, &subject.model,
+          &found.model,   &found.base,   &found.metric,
+          &found.sources, &found.others, std::log(found.whitening.effective_points()),
           progress};
 }
 
@@ -155,10 +172,10 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   tell(options, "scores");
   found->table = score_candidates(corrected, found->base.fit.linearisation.slope, found->candidates, found->whitening,
                                   options.seed);
-  judge_base(subject, problem, *found);
-  const bool silent = !found->table.scores.empty() && found->table.scores.front().p_value >= options.rules.p_value &&
-                      found->figures.left.p_value >= options.rules.lack_of_fit_p;
-  if (!silent && options.refits > 0)
+  judge_base(subject, *found);
+  const bool quiet = is_quiet(*found, options.rules);
+  judge_by_other_poses(subject, options, !quiet || options.correct_quiet_poses, *found);
+  if (!quiet && options.refits > 0)
     found->refits = refit_candidates(problem, found->candidates, found->table,
                                      worth_refitting(found->table, static_cast<std::size_t>(options.refits)));
   for (const Refit& refit : found->refits)

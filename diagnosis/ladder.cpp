@@ -61,6 +61,8 @@ Ladder climb(const Subject& subject, const ExamineOptions& options, const Findin
   ladder.last = first.diagnosis;
   ladder.noise_floor_mm = std::hypot(first.figures.noise_mm, first.sources.spread_mm);
   ladder.model = first.model;
+  ExamineOptions every_rung = options;
+  every_rung.correct_quiet_poses = true;  // the last rung is quiet, and is compared with those before
   std::unique_ptr<Findings> next;
   const Findings* found = &first;
   while (const Refit* refit = chosen_refit(*found)) {
@@ -77,7 +79,7 @@ Ladder climb(const Subject& subject, const ExamineOptions& options, const Findin
     with.model = refit->model;
     with.near = &refit->fit.fit.prediction.solution;
     try {
-      std::unique_ptr<Findings> after = examine(with, options);
+      std::unique_ptr<Findings> after = examine(with, every_rung);
       Rung rung = rung_of(*after, added);
       rung.refit_only = figures_of(*found, ladder.rungs.back().added);
       rung.random_other = random_other(subject, *found, options.seed + static_cast<unsigned>(ladder.rungs.size()));

@@ -2,7 +2,6 @@
 #include "diagnosis/left_out_pose.h"
 
 #include <Eigen/Dense>
-#include <cmath>
 
 namespace supine::diagnosis {
 namespace {
@@ -43,11 +42,11 @@ Eigen::VectorXd step_without_the_others(const calibration::Fit& fit, const FreeP
 
 }  // namespace
 
-std::vector<double> left_out_pose_rms_mm(const WeightedFit& fit, const FreeParameters& parameters,
-                                         const ErrorSources& sources) {
+std::vector<Eigen::VectorXd> left_out_poses_mm(const WeightedFit& fit, const FreeParameters& parameters,
+                                               const ErrorSources& sources) {
   const Residuals& residuals = fit.fit.residuals;
   const int poses = residuals.size() > 0 ? residuals.pose.maxCoeff() + 1 : 0;
-  std::vector<double> all;
+  std::vector<Eigen::VectorXd> all;
   if (poses < 2) return all;
   for (int pose = 0; pose < poses; ++pose) {
     std::vector<int> own, others;
@@ -55,9 +54,8 @@ std::vector<double> left_out_pose_rms_mm(const WeightedFit& fit, const FreeParam
       (residuals.pose[r] == pose ? own : others).push_back(static_cast<int>(r));
     if (own.empty() || others.empty()) continue;
     const Eigen::VectorXd step = step_without_the_others(fit.fit, parameters, sources, others);
-    const Eigen::VectorXd predicted =
-        residuals.distance_mm(own) + sources.mean_mm(own) + fit.fit.linearisation.slope(own, Eigen::all) * step;
-    all.push_back(std::sqrt(predicted.squaredNorm() / static_cast<double>(own.size())));
+    all.emplace_back(residuals.distance_mm(own) + sources.mean_mm(own) +
+                     fit.fit.linearisation.slope(own, Eigen::all) * step);
   }
   return all;
 }

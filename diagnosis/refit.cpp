@@ -9,7 +9,6 @@
 
 #include "calibration/held_out.h"
 #include "common/error.h"
-#include "diagnosis/left_out_pose.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -21,6 +20,7 @@ using simulation::Parameter;
 constexpr int first_steps = 3;
 constexpr double place_start_sd = 1.5;  // how far to either side of its usual place an effect is looked for
 constexpr double hopeless_share = 0.6;  // of the best gain: what is behind that after the first steps is left there
+constexpr double tolerated_hopeless_share = 0.25;  // of an effect that errors may imitate: they take half of its gain
 
 double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
 
@@ -161,9 +161,22 @@ Refit summary(const RefitProblem& problem, Job& job) {
                                           calibration::spatial_blocks(fit.residuals)));
   refit.parameters = linear_intervals(job.effect, job.fit, *job.parameters, *problem.metric);
   refit.model = job.parameters->model(fit.u);
-  if (job.finished) refit.pose_rms_mm = other_pose_rms_mm(problem, refit.model, job.fit, *job.parameters);
+  if (job.finished) {
+    const OtherPoses others =
+        other_poses_of_refit(problem.whole, *job.parameters, job.fit, *problem.sources, *problem.others);
+    refit.pose_rms_mm = others.rms_mm();
+    refit.pose_change_mm = others.change_mm(*problem.others);
+    if (!refit.pose_rms_mm.empty()) {
+      refit.pose_gain = problem.others->objective - others.objective;
+      refit.pose_misfit = others.misfit;
+    }
+  }
   refit.fit = std::move(job.fit);
   return refit;
+}
+
+double hopeless_share_of(const std::string& effect) {
+  return tolerance_for(effect, {}, Tolerances{}) > 0 ? tolerated_hopeless_share : hopeless_share;
 }
 
 template <class Work>
@@ -207,50 +220,6 @@ std::vector<FittedParameter> linear_intervals(const std::string& effect, const W
   return list;
 }
 
-std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model) {
-  std::vector<double> all;
-  const std::size_t fitted = problem.scene.measurements.size();
-  if (problem.whole.measurements.size() == fitted) return all;
-  try {
-    calibration::Evaluator evaluator(problem.whole, model);
-    const calibration::Prediction prediction = evaluator.predict(model);
-    for (std::size_t m = fitted; m < problem.whole.measurements.size(); ++m) {
-      const auto& distances = prediction.poses[m].distances;
-      const auto& means = problem.sources->unfitted_mean_mm;
-      const Eigen::VectorXd d =
-          distances.distance_mm +
-          (means.empty() ? Eigen::VectorXd::Zero(distances.distance_mm.size()).eval() : means[m - fitted]);
-      double sum = 0;
-      Eigen::Index count = 0;
-      for (Eigen::Index i = 0; i < distances.distance_mm.size(); ++i)
-        if (!distances.closest.on_border[i]) sum += d[i] * d[i], ++count;
-      all.push_back(std::sqrt(sum / static_cast<double>(count)));
-    }
-  } catch (const NumericalFailure&) {
-    all.clear();  // that pose has no equilibrium: it says nothing
-  }
-  return all;
-}
-
-std::size_t comparable_poses(const RefitProblem& problem) {
-  const auto& effects = problem.model->effects;
-  const bool elsewhere =
-      std::any_of(effects.begin(), effects.end(), [](const auto& effect) { return effect.name == "misregistration"; });
-  return elsewhere ? 0 : problem.whole.measurements.size() - problem.scene.measurements.size();
-}
-
-std::vector<double> other_pose_rms_mm(const RefitProblem& problem, const simulation::Model& model,
-                                      const WeightedFit& fit, const FreeParameters& parameters) {
-  std::vector<double> all;
-  if (const std::size_t unfitted = comparable_poses(problem); unfitted > 0) {
-    all = unfitted_rms_mm(problem, model);
-    if (all.size() != unfitted) return {};
-  }
-  const std::vector<double> left_out = left_out_pose_rms_mm(fit, parameters, *problem.sources);
-  all.insert(all.end(), left_out.begin(), left_out.end());
-  return all;
-}
-
 std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vector<Candidate>& candidates,
                                     const ScoreTable& table, const std::vector<std::string>& which) {
   std::vector<Job> jobs;
@@ -266,7 +235,8 @@ std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vect
     if (job.solved) best = std::max(best, problem.base->objective - job.objective);
   order.clear();
   for (Job& job : jobs)
-    if (job.solved && problem.base->objective - job.objective >= hopeless_share * best) order.push_back(&job);
+    if (job.solved && problem.base->objective - job.objective >= hopeless_share_of(job.effect) * best)
+      order.push_back(&job);
   side_by_side(problem, order, "to the end with", [&problem](Job& job) { finish(problem, job); });
   std::vector<Refit> refits(jobs.size());
 #pragma omp parallel for schedule(dynamic, 1)

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "diagnosis/error_sources.h"
+#include "diagnosis/other_poses.h"
 #include "diagnosis/score_test.h"
 #include "diagnosis/weighted_fit.h"
 
@@ -27,6 +28,9 @@ struct Refit {
   double bic = 0;         ///< gain − freedom · ln n − Σ ln(prior variance / variance) over its place and shape
   double rms_mm = 0, held_out_rms_mm = 0;   ///< fitted points; every block of skin without itself
   std::vector<double> pose_rms_mm;          ///< of every pose that was not fitted, then of each fitted one left out
+  std::vector<double> pose_change_mm;       ///< rms of what the effect changes there
+  double pose_gain = 0;                     ///< fall of the objective of poses that were not fitted (other_poses.h)
+  double pose_misfit = 1;                   ///< what is left of it, per point
   std::vector<FittedParameter> parameters;  ///< of the effect
   simulation::Model model;                  ///< with the fitted numbers
   WeightedFit fit;
@@ -45,6 +49,7 @@ struct RefitProblem {
   const WeightedFit* base;
   const Metric* metric;
   const ErrorSources* sources;                       ///< of the metric
+  const OtherPoses* others;                          ///< of the base model
   double log_points;                                 ///< ln n of the BIC
   std::function<void(const std::string&)> progress;  ///< may be empty; called by any thread, one at a time
 };
@@ -59,17 +64,5 @@ std::vector<Refit> refit_candidates(const RefitProblem& problem, const std::vect
 /// √max(1, misfit) to each side, cut at the range.
 std::vector<FittedParameter> linear_intervals(const std::string& effect, const WeightedFit& fit,
                                               const calibration::FreeParameters& parameters, const Metric& metric);
-
-/// Root mean square distance of each pose that is not fitted, the mesh's error taken away as far as it is known.
-std::vector<double> unfitted_rms_mm(const RefitProblem& problem, const simulation::Model& model);
-
-/// How many unfitted poses a model can be judged by: none where the base model says that the fitted scan lies
-/// elsewhere, because another scan lies elsewhere in its own way.
-std::size_t comparable_poses(const RefitProblem& problem);
-
-/// RMS of these, then of each fitted pose left out (left_out_pose.h), where several are; empty where an unfitted one
-/// has no equilibrium: lists of two models are compared row by row.
-std::vector<double> other_pose_rms_mm(const RefitProblem& problem, const simulation::Model& model,
-                                      const WeightedFit& fit, const calibration::FreeParameters& parameters);
 
 }  // namespace supine::diagnosis

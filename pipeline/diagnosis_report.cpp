@@ -61,27 +61,34 @@ Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, 
 
 Json number_or_null(const std::vector<double>& values) { return values.empty() ? Json(nullptr) : Json(values); }
 
+Json left_json(const diagnosis::LackOfFit& left) { return {{"misfit", left.misfit}, {"p_value", left.p_value}}; }
+
 Json candidate_json(const Findings& found, const Score& score) {
   const Refit* refit = refit_of(found, score.effect);
-  return {{"effect", score.effect},
-          {"p_value", score.p_value},
-          {"predicted_rms_mm", score.predicted_rms_mm},
-          {"refit_rms_mm", refit ? Json(refit->rms_mm) : Json(nullptr)},
-          {"held_out_rms_mm", refit ? refit->held_out_rms_mm : score.predicted_held_out_rms_mm},
-          {"held_out_pose_rms_mm", refit ? number_or_null(refit->pose_rms_mm) : Json(nullptr)},
-          {"parameters", parameters_json(candidate_of(found, score.effect), score, refit)},
-          {"not_told_apart_from", rivals_of(found, score.effect)},
-          {"same_shape_as", score.not_told_apart_from},
-          {"statistic", score.statistic},
-          {"freedom", score.freedom},
-          {"bic", score.bic},
-          {"refit_bic", refit ? Json(refit->bic) : Json(nullptr)},
-          {"refit_finished", refit ? Json(refit->finished) : Json(nullptr)},
-          {"wrong_sign", score.wrong_sign},
-          {"beyond_range", score.beyond_range},
-          {"predicted_held_out_rms_mm", score.predicted_held_out_rms_mm},
-          {"noncentrality", score.noncentrality},
-          {"power", score.power}};
+  return {
+      {"effect", score.effect},
+      {"p_value", score.p_value},
+      {"predicted_rms_mm", score.predicted_rms_mm},
+      {"refit_rms_mm", refit ? Json(refit->rms_mm) : Json(nullptr)},
+      {"held_out_rms_mm", refit ? refit->held_out_rms_mm : score.predicted_held_out_rms_mm},
+      {"held_out_pose_rms_mm", refit ? number_or_null(refit->pose_rms_mm) : Json(nullptr)},
+      {"changes_pose_mm", refit ? number_or_null(refit->pose_change_mm) : Json(nullptr)},
+      {"pose_gain", refit && found.others.unfitted > 0 ? Json(refit->pose_gain) : Json(nullptr)},
+      {"pose_misfit", refit && found.others.unfitted > 0 ? Json(refit->pose_misfit) : Json(nullptr)},
+      {"left", refit ? left_json(found.left[static_cast<std::size_t>(refit - found.refits.data())]) : Json(nullptr)},
+      {"parameters", parameters_json(candidate_of(found, score.effect), score, refit)},
+      {"not_told_apart_from", rivals_of(found, score.effect)},
+      {"same_shape_as", score.not_told_apart_from},
+      {"statistic", score.statistic},
+      {"freedom", score.freedom},
+      {"bic", score.bic},
+      {"refit_bic", refit ? Json(refit->bic) : Json(nullptr)},
+      {"refit_finished", refit ? Json(refit->finished) : Json(nullptr)},
+      {"wrong_sign", score.wrong_sign},
+      {"beyond_range", score.beyond_range},
+      {"predicted_held_out_rms_mm", score.predicted_held_out_rms_mm},
+      {"noncentrality", score.noncentrality},
+      {"power", score.power}};
 }
 
 Json alike_json(const diagnosis::ScoreTable& table) {
@@ -92,8 +99,6 @@ Json alike_json(const diagnosis::ScoreTable& table) {
   }
   return {{"effects", table.effects}, {"correlation", rows}};
 }
-
-Json left_json(const diagnosis::LackOfFit& left) { return {{"misfit", left.misfit}, {"p_value", left.p_value}}; }
 
 Json budget_json(const diagnosis::ErrorBudget& b) {
   return {{"total", b.total},         {"noise", b.noise},           {"registration", b.registration},
@@ -266,6 +271,8 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["base_rms_mm"] = found.figures.rms_mm;
   f["base_held_out_rms_mm"] = found.figures.held_out_rms_mm;
   f["base_held_out_pose_rms_mm"] = number_or_null(found.figures.pose_rms_mm);
+  f["base_pose_misfit"] = found.others.unfitted > 0 ? Json(found.others.misfit) : Json(nullptr);
+  f["other_poses_corrected"] = !found.sources.unfitted_mean_mm.empty();
   f["base_parameters"] = Json::object();
   const calibration::FreeParameters parameters(found.model);
   for (Eigen::Index i = 0; i < parameters.size(); ++i)

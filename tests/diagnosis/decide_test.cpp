@@ -46,11 +46,48 @@ TEST(Decide, NamesAllThatDoAsWellMeasurementFirst) {
   EXPECT_EQ(d.missing, (Names{"misregistration", "adhesion"}));
 }
 
-TEST(Decide, AHeldOutPoseTellsApartAndBringsBack) {
-  EXPECT_EQ(verdict({refit("adhesion", 60, 0.8, {0.9}), refit("ligament", 57, 0.8, {1.4})}).missing, Names{"adhesion"});
-  const Diagnosis back = verdict({refit("adhesion", 60, 0.8, {1.4}), refit("ligament", 20, 0.8, {0.9})});
-  EXPECT_EQ(back.verdict, Verdict::ambiguous);
-  EXPECT_EQ(back.missing, (Names{"adhesion", "ligament"}));
+/// A scan of another pose that was not fitted, at @p pose_mm with the effect.
+Refit seen_elsewhere(Refit r, double gain, double pose_mm) {
+  r.pose_gain = gain;
+  r.pose_rms_mm = {pose_mm};
+  return r;
+}
+
+BaseFigures with_unfitted_pose(const LackOfFit& left) {
+  BaseFigures base = base_figures(left);
+  base.pose_rms_mm = {1.0};  // 0.51 mm² above the noise
+  base.unfitted_poses = 1;
+  return base;
+}
+
+TEST(Decide, APoseThatWasNotFittedHasItsSay) {
+  const BaseFigures base = with_unfitted_pose(real_left);
+  const auto of_two = [&base](double gain_of_adhesion, double gain_of_ligament) {
+    return decide(table_with(0.001),
+                  {seen_elsewhere(refit("adhesion", 40, 0.8), gain_of_adhesion, 0.8),
+                   seen_elsewhere(refit("ligament", 20, 0.8), gain_of_ligament, 0.8)},
+                  {nothing_left, nothing_left}, base)
+        .missing;
+  };
+  EXPECT_EQ(of_two(5, 5), Names{"adhesion"});
+  EXPECT_EQ(of_two(-20, 25), Names{"ligament"});
+  EXPECT_EQ(of_two(-20, 2), (Names{"ligament", "adhesion"})) << "20 and 22";
+  EXPECT_EQ(of_two(40, 1000), Names{"adhesion"}) << "at most twice what the fitted pose says";
+}
+
+TEST(Decide, AnUnfittedPoseThatComesOutFurtherOffSpeaksForNothing) {
+  const BaseFigures base = with_unfitted_pose(real_left);
+  const auto with = [&base](double bic, double gain, double pose_mm) {
+    return decide(table_with(0.001), {seen_elsewhere(refit("ligament", bic, 1.8), gain, pose_mm)}, {nothing_left}, base)
+        .verdict;
+  };
+  EXPECT_EQ(with(4, 5, 0.9), Verdict::missing) << "another scan is proof of another kind";
+  EXPECT_EQ(with(4, 5, 1.1), Verdict::unexplained);
+  EXPECT_EQ(with(15, 5, 1.01), Verdict::missing) << "where it hardly shows it has no say";
+  EXPECT_EQ(with(15, -1, 0.9), Verdict::unexplained) << "or against it";
+  EXPECT_EQ(with(60, -30, 1.1), Verdict::missing) << "unless the fitted one says far more";
+  EXPECT_EQ(with(60, -50, 1.1), Verdict::unexplained);
+  EXPECT_EQ(with(1, 50, 0.8), Verdict::unexplained) << "nothing in the fitted pose";
 }
 
 TEST(Decide, DoesNotNameWhatTheHeldOutErrorDoesNotConfirm) {
@@ -71,7 +108,7 @@ TEST(Decide, ALowPNamesWhatLiesUnderOneBlockOfSkinAlone) {
   EXPECT_EQ(verdict({refit("ligament", 4, 1.8)}).verdict, Verdict::unexplained) << "BIC";
 }
 
-TEST(Decide, AnUnfittedPoseHasToConfirmIt) {
+TEST(Decide, AFittedPoseLeftOutHasToConfirmIt) {
   BaseFigures base = base_figures(real_left);
   base.pose_rms_mm = {1.0};
   const auto with_pose = [&base](double pose, double bic = 15) {
@@ -87,20 +124,19 @@ TEST(Decide, AnUnfittedPoseHasToConfirmIt) {
 }
 
 TEST(Decide, WhatLeavesAResidualHasToShowMoreInTheUnfittedPose) {
-  BaseFigures base = base_figures(real_left);
-  base.pose_rms_mm = {1.0};  // 0.51 mm² above the noise
-  base.unfitted_poses = 1;
-  const auto with_pose = [&base](double pose, double p_left) {
-    return decide(table_with(0.001), {refit("ligament", 60, 0.8, {pose})}, {{1.2, p_left}}, base);
+  BaseFigures base = with_unfitted_pose(real_left);
+  const auto with_pose = [&base](double pose, const LackOfFit& after) {
+    return decide(table_with(0.001), {seen_elsewhere(refit("ligament", 60, 0.8), 10, pose)}, {after}, base);
   };
-  EXPECT_EQ(with_pose(0.95, 0.4).verdict, Verdict::missing);
-  EXPECT_EQ(with_pose(0.9, 1e-4).verdict, Verdict::missing);
-  const Diagnosis half = with_pose(0.95, 1e-4);
+  EXPECT_EQ(with_pose(0.95, {1.2, 0.4}).verdict, Verdict::missing);
+  EXPECT_EQ(with_pose(0.9, {1.2, 1e-4}).verdict, Verdict::missing);
+  EXPECT_EQ(with_pose(0.95, {1.05, 1e-4}).verdict, Verdict::missing) << "next to nothing is left";
+  const Diagnosis half = with_pose(0.95, {1.2, 1e-4});
   EXPECT_EQ(half.verdict, Verdict::unexplained);
   EXPECT_EQ(half.missing, Names{"ligament"});
-  base.unfitted_poses = 0;
-  EXPECT_EQ(with_pose(0.95, 1e-4).verdict, Verdict::missing) << "fitted with the others, left out in one linear step";
   EXPECT_NE(half.why.find("19 % of what scans that were not fitted have"), std::string::npos) << half.why;
+  base.unfitted_poses = 0;
+  EXPECT_EQ(with_pose(0.95, {1.2, 1e-4}).verdict, Verdict::missing) << "fitted, left out in one linear step";
 }
 
 TEST(Decide, BlocksOfSkinAreNotBelievedWhereAnotherPoseDoesNotShowIt) {

@@ -23,7 +23,12 @@ struct TwoPoses {
     sources.noise_mm = r.sigma_mm;
     sources.mean_mm = Eigen::VectorXd::Zero(r.size());
   }
-  std::vector<double> rms() const { return left_out_pose_rms_mm(fit, calibration::FreeParameters(model), sources); }
+  std::vector<double> rms() const {
+    std::vector<double> each;
+    for (const Eigen::VectorXd& d : left_out_poses_mm(fit, calibration::FreeParameters(model), sources))
+      each.push_back(d.norm() / std::sqrt(static_cast<double>(d.size())));
+    return each;
+  }
 
   static constexpr Eigen::Index half = 300;
   simulation::Model model;

@@ -101,6 +101,12 @@ class Scored(unittest.TestCase):
         self.assertIn("2/7 = 29 % [8, 64]", text)
         self.assertEqual(len((self.root / "score.csv").read_text().splitlines()), len(CASES) + 1)
 
+    def test_scores_are_put_together(self):
+        hidden_score.write(self.cases[:4], self.root / "first")
+        hidden_score.write(self.cases[3:], self.root / "second")
+        again = hidden_score.scored_before([self.root / "first.jsonl", self.root / "second.jsonl"])
+        self.assertEqual(hidden_score.text_of(again), hidden_score.text_of(self.cases))
+
     def test_unknown_verdict_is_refused(self):
         (self.root / "out" / "case-000" / "diagnosis.json").write_text('{"verdict": "perhaps", "missing": []}')
         with self.assertRaisesRegex(SystemExit, "perhaps"):

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/other_poses.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "common/error.h"
+#include "diagnosis/candidates.h"
+#include "diagnosis/left_out_pose.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::FreeParameters;
+using calibration::Prediction;
+using calibration::Scene;
+
+std::size_t fitted_poses(const WeightedFit& fit) { return fit.fit.prediction.solution.poses.size(); }
+
+/// The fit's solution, and the poses it lacks: as far from its undeformed shape as they were in @p base, or there.
+simulation::ChainSolution start_of(const Scene& whole, const WeightedFit& fit, const OtherPoses* base) {
+  simulation::ChainSolution start = fit.fit.prediction.solution;
+  for (std::size_t first = fitted_poses(fit), m = first; m < whole.measurements.size(); ++m) {
+    Points x = start.X;
+    if (base != nullptr && !base->solved.empty()) x += base->solved[m - first].x - base->X;
+    start.poses.push_back({.name = whole.measurements[m]->pose.name, .x = std::move(x), .report = {}});
+  }
+  return start;
+}
+
+/// Points over the skin of the poses from @p first on.
+calibration::PointMask points_from(std::size_t first, const Prediction& prediction) {
+  calibration::PointMask mask = calibration::points_over_skin(prediction);
+  for (std::size_t m = 0; m < std::min(first, mask.size()); ++m) mask[m].setConstant(false);
+  return mask;
+}
+
+void keep(const WeightedFit& fit, const Prediction& prediction, const ErrorSources& sources, OtherPoses& others) {
+  const std::size_t first = fitted_poses(fit);
+  const auto& means = sources.unfitted_mean_mm;
+  for (std::size_t m = first; m < prediction.poses.size(); ++m) {
+    Eigen::VectorXd d = prediction.poses[m].distances.distance_mm;
+    if (!means.empty()) d += means[m - first];
+    std::vector<int> points;
+    for (Eigen::Index i = 0; i < d.size(); ++i)
+      if (others.mask[m][i]) points.push_back(static_cast<int>(i));
+    others.distance_mm.emplace_back(d(points));
+  }
+  const auto& poses = prediction.solution.poses;
+  others.solved.assign(poses.begin() + static_cast<std::ptrdiff_t>(first), poses.end());
+  others.X = prediction.solution.X;
+}
+
+Eigen::VectorXd joined(const OtherPoses& others) {
+  Eigen::VectorXd all(0);
+  for (std::size_t i = 0; i < others.unfitted; ++i) {
+    const Eigen::VectorXd& d = others.distance_mm[i];
+    all.conservativeResize(all.size() + d.size());
+    all.tail(d.size()) = d;
+  }
+  return all;
+}
+
+/// Of the points of others.mask: errors as in the fitted scan, each scan with its own place and breath, and what the
+/// fitted parameters are uncertain by.
+Whitening unfitted_whitening(calibration::Evaluator& evaluator, const FreeParameters& parameters,
+                             const WeightedFit& fit, const ErrorSources& sources, const Metric& metric,
+                             const Tolerances& tolerances, const Prediction& prediction, const OtherPoses& others) {
+  const Scene& whole = evaluator.scene();
+  const simulation::Model model = parameters.model(fit.fit.u);
+  std::vector<double> noise = metric.noise_mm;
+  for (std::size_t m = noise.size(); m < whole.measurements.size(); ++m)
+    noise.push_back(whole.measurements[m]->noise_mm.value_or(metric.noise_mm.front()));
+  calibration::Fit seen;
+  seen.prediction = prediction;
+  seen.residuals = calibration::residuals_of(whole, prediction, others.mask, noise);
+  std::vector<std::string> unseen;
+  const auto candidates = find_candidates(evaluator, model, seen, unseen);
+  ErrorSources errors =
+      error_sources(seen.residuals, candidates, nullptr, {0, sources.spread_mm, sources.length_mm}, tolerances);
+  const simulation::Sensitivities sensitivities(evaluator.chain(), model, prediction.solution);
+  const Eigen::MatrixXd slope =
+      calibration::linearise(evaluator, sensitivities, parameters, fit.fit.u, prediction, seen.residuals).slope;
+  const Eigen::MatrixXd covariance =
+      information(fit, parameters, metric).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
+  const Eigen::MatrixXd shapes = slope * axes.eigenvectors() * axes.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  for (Eigen::Index i = 0; i < shapes.cols(); ++i) errors.modes.push_back({"parameters", shapes.col(i)});
+  return Whitening::of(seen.residuals, errors);
+}
+
+void weigh_unfitted(OtherPoses& others) {
+  const Eigen::VectorXd white = others.whitening->apply(joined(others));
+  others.objective = white.squaredNorm();
+  others.misfit = others.objective / static_cast<double>(white.size());
+}
+
+void add_left_out(const FreeParameters& parameters, const WeightedFit& fit, const ErrorSources& sources,
+                  OtherPoses& others) {
+  for (Eigen::VectorXd& left_out : left_out_poses_mm(fit, parameters, sources))
+    others.distance_mm.push_back(std::move(left_out));
+}
+
+bool says_the_scan_lies_elsewhere(const simulation::Model& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(),
+                     [](const auto& effect) { return effect.name == "misregistration"; });
+}
+
+double rms(const Eigen::VectorXd& d) { return d.size() > 0 ? d.norm() / std::sqrt(static_cast<double>(d.size())) : 0; }
+
+}  // namespace
+
+std::vector<double> OtherPoses::rms_mm() const {
+  std::vector<double> all;
+  for (const Eigen::VectorXd& d : distance_mm) all.push_back(rms(d));
+  return all;
+}
+
+std::vector<double> OtherPoses::change_mm(const OtherPoses& other) const {
+  std::vector<double> all;
+  if (other.distance_mm.size() != distance_mm.size()) return all;
+  for (std::size_t i = 0; i < distance_mm.size(); ++i) all.push_back(rms(distance_mm[i] - other.distance_mm[i]));
+  return all;
+}
+
+OtherPoses other_poses_of_base(const Scene& whole, const FreeParameters& parameters, const WeightedFit& fit,
+                               const ErrorSources& sources, const Metric& metric, const Tolerances& tolerances) {
+  OtherPoses others;
+  const simulation::Model model = parameters.model(fit.fit.u);
+  const std::size_t first = fitted_poses(fit);
+  if (!says_the_scan_lies_elsewhere(model) && whole.measurements.size() > first) try {
+      calibration::Evaluator evaluator(whole, model);
+      const simulation::ChainSolution start = start_of(whole, fit, nullptr);
+      const Prediction prediction = evaluator.predict(model, &start);
+      others.unfitted = whole.measurements.size() - first;
+      others.mask = points_from(first, prediction);
+      keep(fit, prediction, sources, others);
+      others.whitening = std::make_shared<Whitening>(
+          unfitted_whitening(evaluator, parameters, fit, sources, metric, tolerances, prediction, others));
+      weigh_unfitted(others);
+    } catch (const NumericalFailure&) {
+      others = {};  // that pose has no equilibrium: it says nothing
+    }
+  add_left_out(parameters, fit, sources, others);
+  return others;
+}
+
+OtherPoses other_poses_of_refit(const Scene& whole, const FreeParameters& parameters, const WeightedFit& fit,
+                                const ErrorSources& sources, const OtherPoses& base) {
+  OtherPoses others;
+  others.unfitted = base.unfitted;
+  others.mask = base.mask;
+  others.whitening = base.whitening;
+  if (base.unfitted > 0) try {
+      const simulation::Model model = parameters.model(fit.fit.u);
+      const simulation::ChainSolution start = start_of(whole, fit, &base);
+      keep(fit, calibration::Evaluator(whole, model).predict(model, &start), sources, others);
+      weigh_unfitted(others);
+    } catch (const NumericalFailure&) {
+      return {};
+    }
+  add_left_out(parameters, fit, sources, others);
+  return others;
+}
+
+}  // namespace supine::diagnosis
