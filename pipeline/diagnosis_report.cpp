@@ -149,16 +149,17 @@ void say_scores(const Run& run, const Findings& found) {
 
 void say_refits(const Run& run, const Findings& found) {
   if (found.refits.empty()) return;
-  run.say(fmt::format("  {:<20}{:>9}{:>8}{:>10}{:>10}{:>8}   {}", "added, fitted again", "BIC", "RMS", "held out",
-                      "pose", "misfit", "values"));
+  run.say(fmt::format("  {:<20}{:>9}{:>8}{:>10}{:>10}{:>8}{:>8}   {}", "added, fitted again", "BIC", "RMS", "held out",
+                      "pose", "gain", "misfit", "values"));
   for (std::size_t r = 0; r < found.refits.size(); ++r) {
     const Refit& refit = found.refits[r];
     if (!refit.solved)
       run.say(fmt::format("  {:<20}  no equilibrium", refit.effect));
     else
       run.say(fmt::format(
-          "  {:<20}{:>9.1f}{:>8.3f}{:>10.3f}{:>10}{:>8.2f}   {}{}", refit.effect, refit.bic, refit.rms_mm,
+          "  {:<20}{:>9.1f}{:>8.3f}{:>10.3f}{:>10}{:>8}{:>8.2f}   {}{}", refit.effect, refit.bic, refit.rms_mm,
           refit.held_out_rms_mm, refit.pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", refit.pose_rms_mm[0]),
+          found.others.unfitted == 0 || refit.pose_rms_mm.empty() ? "-" : fmt::format("{:.1f}", refit.pose_gain),
           found.left[r].misfit, values_of(refit.parameters), refit.finished ? "" : " (given up early)"));
   }
 }

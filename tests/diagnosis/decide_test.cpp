@@ -11,7 +11,7 @@ using Names = std::vector<std::string>;
 ScoreTable table_with(double p) {
   Score score{};
   score.effect = "ligament", score.p_value = p;
-  return {{score}, 1.3, 1.4, 100};
+  return {{score}, 1.3, 1.4, 100, 0, {}, {}};
 }
 
 Refit refit(const std::string& effect, double bic, double held_out, std::vector<double> poses = {}) {
