@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,9 @@ struct Candidate {
 /// Every effect of the catalogue that is not in the model and that the fitted points can feel. Parameters that change
 /// nothing at the null (the place of a ligament of no stiffness) are left out.
 /// @param unseen  out: effects of the catalogue that move no fitted point, here or anywhere
+/// @param wanted  which effects to look at; empty = all
 std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const simulation::Model& model,
-                                       const calibration::Fit& fit, std::vector<std::string>& unseen);
+                                       const calibration::Fit& fit, std::vector<std::string>& unseen,
+                                       const std::function<bool(const std::string& effect)>& wanted = {});
 
 }  // namespace supine::diagnosis

@@ -62,6 +62,8 @@ Eigen::VectorXd joined(const OtherPoses& others) {
   return all;
 }
 
+bool is_source_of_error(const std::string& effect) { return tolerance_for(effect, {}, Tolerances{}) > 0; }
+
 /// Of the points of others.mask: errors as in the fitted scan, each scan with its own place and breath, and what the
 /// fitted parameters are uncertain by.
 Whitening unfitted_whitening(calibration::Evaluator& evaluator, const FreeParameters& parameters,
@@ -76,7 +78,7 @@ Whitening unfitted_whitening(calibration::Evaluator& evaluator, const FreeParame
   seen.prediction = prediction;
   seen.residuals = calibration::residuals_of(whole, prediction, others.mask, noise);
   std::vector<std::string> unseen;
-  const auto candidates = find_candidates(evaluator, model, seen, unseen);
+  const auto candidates = find_candidates(evaluator, model, seen, unseen, is_source_of_error);
   ErrorSources errors =
       error_sources(seen.residuals, candidates, nullptr, {0, sources.spread_mm, sources.length_mm}, tolerances);
   const simulation::Sensitivities sensitivities(evaluator.chain(), model, prediction.solution);
