@@ -135,12 +135,14 @@ OtherPoses other_poses_of_base(const Scene& whole, const FreeParameters& paramet
       calibration::Evaluator evaluator(whole, model);
       const simulation::ChainSolution start = start_of(whole, fit, nullptr);
       const Prediction prediction = evaluator.predict(model, &start);
-      others.unfitted = whole.measurements.size() - first;
       others.mask = points_from(first, prediction);
-      keep(fit, prediction, sources, others);
-      others.whitening = std::make_shared<Whitening>(
-          unfitted_whitening(evaluator, parameters, fit, sources, metric, tolerances, prediction, others));
-      weigh_unfitted(others);
+      if (std::any_of(others.mask.begin(), others.mask.end(), [](const auto& points) { return points.any(); })) {
+        others.unfitted = whole.measurements.size() - first;
+        keep(fit, prediction, sources, others);
+        others.whitening = std::make_shared<Whitening>(
+            unfitted_whitening(evaluator, parameters, fit, sources, metric, tolerances, prediction, others));
+        weigh_unfitted(others);
+      }
     } catch (const NumericalFailure&) {
       others = {};  // that pose has no equilibrium: it says nothing
     }
