@@ -272,7 +272,8 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["base_rms_mm"] = found.figures.rms_mm;
   f["base_held_out_rms_mm"] = found.figures.held_out_rms_mm;
   f["base_held_out_pose_rms_mm"] = number_or_null(found.figures.pose_rms_mm);
-  f["base_pose_misfit"] = found.others.unfitted > 0 ? Json(found.others.misfit) : Json(nullptr);
+  f["base_pose_misfit"] =
+      found.others.unfitted > 0 && !found.sources.unfitted_mean_mm.empty() ? Json(found.others.misfit) : Json(nullptr);
   f["other_poses_corrected"] = !found.sources.unfitted_mean_mm.empty();
   f["base_parameters"] = Json::object();
   const calibration::FreeParameters parameters(found.model);
