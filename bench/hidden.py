@@ -160,6 +160,8 @@ def arguments():
 
 def main():
     options = arguments()
+    if options.first < 1:
+        raise SystemExit(f"--first {options.first}: cases are counted from 1")
     work = options.work.resolve()
     options.bin = options.bin.resolve()
     for folder in ("cases", "answers", "out", "logs"):

@@ -68,16 +68,14 @@ double say_of_unfitted(const Refit& refit, const BaseFigures& base) {
 /// b with it.
 double evidence(const Refit& refit, const BaseFigures& base) { return refit.bic + say_of_unfitted(refit, base); }
 
-/// Whether poses predicted without themselves bear it out, where there are any.
+/// Whether poses predicted without themselves bear it out, where there are any. Where it has no equilibrium there they
+/// do not.
 bool is_borne_out(const Refit& refit, const BaseFigures& base, const VerdictRules& rules) {
-  if (say_of_unfitted(refit, base) < 0 && evidence(refit, base) < rules.strong_bic) return false;
+  const bool unseen = refit.pose_rms_mm.size() != base.pose_rms_mm.size();
+  const bool denied = unseen || say_of_unfitted(refit, base) < -rules.pose_bic;
+  if (denied && evidence(refit, base) < rules.strong_bic) return false;
   const double share = refit.bic < rules.bic ? rules.weak_excess_share : rules.pose_excess_share;
   return fall_of_left_out(refit, base).value_or(1) >= share;
-}
-
-/// Whether any pose predicted without itself judges it.
-bool has_judges(const Refit& refit, const BaseFigures& base) {
-  return unfitted_judges(refit, base) > 0 || fall_of_left_out(refit, base).has_value();
 }
 
 /// Whether the refit stands out from the model as it is (b = 0), and what was not fitted shows it: blocks of skin, or
@@ -87,9 +85,10 @@ bool counts(const Refit& refit, const ScoreTable& table, const BaseFigures& base
   if (refit.bic >= rules.bic && evidence(refit, base) >= rules.bic &&
       (improves(refit.held_out_rms_mm, base, rules) || p_of_effect(table, refit.effect) <= rules.sure_p))
     return true;
-  const bool left_out_show_it = fall_of_left_out(refit, base).has_value();
-  return p_of_effect(table, refit.effect) <= rules.sure_p && has_judges(refit, base) && refit.bic >= rules.pose_bic &&
-         (left_out_show_it || evidence(refit, base) >= rules.bic);
+  if (p_of_effect(table, refit.effect) > rules.sure_p || refit.bic < rules.pose_bic) return false;
+  const double unfitted_fall = fall(refit, base, 0, unfitted_judges(refit, base)).value_or(0);
+  return fall_of_left_out(refit, base).has_value() || unfitted_fall >= rules.weak_excess_share ||
+         evidence(refit, base) >= rules.bic;
 }
 
 bool comes_near(const Refit& refit, const Refit& best, double misfit, const BaseFigures& base,
@@ -183,13 +182,16 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
   }
   const std::vector<const Refit*> good = best_and_rivals(table, refits, left, base, rules);
   if (good.empty()) {
-    result.why = "no effect of the catalogue lowers the held-out error";
-    if (!refits.empty() && refits.front().finished && refits.front().bic > rules.bic)
-      result.why += fmt::format("; {} fits best (p {:.3f}) but is not confirmed", refits.front().effect, p);
-    const bool strong = !refits.empty() && refits.front().finished && refits.front().bic >= rules.strong_bic;
+    const Refit* most = nullptr;
+    for (const Refit& refit : refits)
+      if (refit.finished && (most == nullptr || evidence(refit, base) > evidence(*most, base))) most = &refit;
+    result.why = "no effect of the catalogue is borne out by what was not fitted";
+    if (most != nullptr && most->bic > rules.bic)
+      result.why += fmt::format("; {} fits best (p {:.3f})", most->effect, p);
+    const bool strong = most != nullptr && most->bic >= rules.strong_bic;
     if (!real(base.left) && !(strong && p < rules.p_value)) return result;
     result.verdict = Verdict::unexplained;
-    if (!refits.empty()) result.missing = {refits.front().effect};
+    if (!refits.empty()) result.missing = {most != nullptr ? most->effect : refits.front().effect};
     return result;
   }
   const Refit& best = *good.front();

@@ -22,8 +22,8 @@ struct VerdictRules {
   double held_out_share = 0.05;  ///< the held-out RMS must fall by this share
   double held_out_mm = 0.05;     ///< and by this much
   double excess_share = 0.3;     ///< or by this share of what it has above the noise, in squares
-  double bic = 6;  ///< least b of what is named; candidates within this of the best cannot be told from it, times the
-                   ///< misfit left
+  double bic = 6;  ///< least evidence of what is named; candidates within this of the best cannot be told from it,
+                   ///< times the misfit left
   double sure_p = 0.01;             ///< of an effect that counts by itself, whatever the held-out blocks show
   double pose_bic = 2;              ///< least b in the fitted pose where another one says the rest
   double pose_excess_share = 0.05;  ///< a fitted pose left out must lose this share of its excess, in squares
@@ -61,10 +61,12 @@ struct Diagnosis {
 /// nothing_missing  no score that chance would not give (p), or nothing that lowers the held-out error
 /// missing          one refit counts and no other comes near. Its evidence is b plus what poses that were not fitted
 ///                  gain with it (Refit::pose_gain; at most twice b for it, nothing where they end further off, in
-///                  full against it). It counts with evidence of `bic` or more if the held-out error falls or its own
-///                  p is below sure_p, because blocks of skin predicted without themselves cannot show what lies under
-///                  one of them alone. Where such poses speak against it the evidence must be `strong_bic`; fitted
-///                  poses left out, where several are fitted, have to fall too
+///                  full against it). It counts where b and evidence are `bic` or more and the held-out error falls
+///                  or its own p is below sure_p, because blocks of skin predicted without themselves cannot show what
+///                  lies under one of them alone. With such a p b of pose_bic will do where the evidence is `bic`, or
+///                  such a pose, or one left out, loses weak_excess_share. Where one speaks against it (gain below
+///                  −pose_bic) or has no equilibrium the evidence must be `strong_bic`; fitted poses left out, where
+///                  several are fitted, have to fall too
 /// ambiguous        others have evidence within `bic` of the best, measurement effects first
 /// unexplained      nothing counts, though the residual is real or the best b is at least `strong_bic`; or the best
 ///                  leaves much of a real residual, or some of it and most of what a pose that was not fitted has

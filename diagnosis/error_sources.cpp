@@ -50,9 +50,12 @@ double tolerance_for(const std::string& effect, const std::string& unit, const T
   return effect == "incompressibility" ? t.incompressibility : 0;
 }
 
+bool errors_imitate(const std::string& effect) { return tolerance_for(effect, {}, Tolerances{}) > 0; }
+
 void set_numerical(const NumericalError& numerical, const Tolerances& tolerances, ErrorSources& sources) {
   std::erase_if(sources.modes, [](const ErrorMode& mode) { return mode.source == "mesh"; });
   sources.mean_mm = tolerances.correction * numerical.finer_mm;
+  sources.mean_doubt = numerical.finer_doubt;
   sources.modes.push_back({"mesh", numerical.finer_doubt * numerical.finer_mm});
   sources.modes.push_back({"mesh", numerical.coarser_mm});
   sources.spread_mm = numerical.spread_mm;

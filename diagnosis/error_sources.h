@@ -26,6 +26,9 @@ struct Tolerances {
 /// How well a parameter of an effect is known to be at its null, 1 sigma; 0 for effects that are no source of error.
 double tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& tolerances);
 
+/// Whether errors that are tolerated can look like the effect.
+bool errors_imitate(const std::string& effect);
+
 /// A shape the distances may take although nothing is missing, as large as one standard deviation.
 struct ErrorMode {
   std::string source;  ///< registration, segmentation, chest_wall, numerical (incompressibility), mesh
@@ -39,6 +42,7 @@ struct ErrorSources {
   Eigen::VectorXd noise_mm;                       ///< #R
   Eigen::VectorXd mean_mm;                        ///< #R
   std::vector<Eigen::VectorXd> unfitted_mean_mm;  ///< mean_mm for all points of each unfitted measurement; empty = 0
+  double mean_doubt = 0;                          ///< how uncertain mean_mm is, as a share of it
   std::vector<ErrorMode> modes;
   double spread_mm = 0, length_mm = 1;  ///< what the mesh does beyond its modes, rms; 0 = nothing
   Eigen::VectorXd share;                ///< #R, of the spread at each point; mean square 1; empty = 1 everywhere

@@ -16,6 +16,8 @@ using calibration::FreeParameters;
 using calibration::Prediction;
 using calibration::Scene;
 
+double rms(const Eigen::VectorXd& d) { return d.size() > 0 ? d.norm() / std::sqrt(static_cast<double>(d.size())) : 0; }
+
 std::size_t fitted_poses(const WeightedFit& fit) { return fit.fit.prediction.solution.poses.size(); }
 
 /// The fit's solution, and the poses it lacks: as far from its undeformed shape as they were in @p base, or there.
@@ -36,36 +38,44 @@ calibration::PointMask points_from(std::size_t first, const Prediction& predicti
   return mask;
 }
 
+/// What all points of the last measurements have, of those in the mask.
+std::vector<Eigen::VectorXd> points_of(const std::vector<Eigen::VectorXd>& last, const calibration::PointMask& mask) {
+  std::vector<Eigen::VectorXd> kept;
+  for (std::size_t i = 0; i < last.size(); ++i) {
+    const auto& of_scan = mask[mask.size() - last.size() + i];
+    std::vector<int> points;
+    for (Eigen::Index k = 0; k < of_scan.size(); ++k)
+      if (of_scan[k]) points.push_back(static_cast<int>(k));
+    kept.emplace_back(last[i](points));
+  }
+  return kept;
+}
+
 void keep(const WeightedFit& fit, const Prediction& prediction, const ErrorSources& sources, OtherPoses& others) {
   const std::size_t first = fitted_poses(fit);
   const auto& means = sources.unfitted_mean_mm;
+  std::vector<Eigen::VectorXd> distances;
   for (std::size_t m = first; m < prediction.poses.size(); ++m) {
-    Eigen::VectorXd d = prediction.poses[m].distances.distance_mm;
-    if (!means.empty()) d += means[m - first];
-    std::vector<int> points;
-    for (Eigen::Index i = 0; i < d.size(); ++i)
-      if (others.mask[m][i]) points.push_back(static_cast<int>(i));
-    others.distance_mm.emplace_back(d(points));
+    distances.push_back(prediction.poses[m].distances.distance_mm);
+    if (!means.empty()) distances.back() += means[m - first];
   }
+  others.distance_mm = points_of(distances, others.mask);
   const auto& poses = prediction.solution.poses;
   others.solved.assign(poses.begin() + static_cast<std::ptrdiff_t>(first), poses.end());
   others.X = prediction.solution.X;
 }
 
-Eigen::VectorXd joined(const OtherPoses& others) {
+Eigen::VectorXd joined(const std::vector<Eigen::VectorXd>& parts) {
   Eigen::VectorXd all(0);
-  for (std::size_t i = 0; i < others.unfitted; ++i) {
-    const Eigen::VectorXd& d = others.distance_mm[i];
-    all.conservativeResize(all.size() + d.size());
-    all.tail(d.size()) = d;
+  for (const Eigen::VectorXd& part : parts) {
+    all.conservativeResize(all.size() + part.size());
+    all.tail(part.size()) = part;
   }
   return all;
 }
 
-bool is_source_of_error(const std::string& effect) { return tolerance_for(effect, {}, Tolerances{}) > 0; }
-
-/// Of the points of others.mask: errors as in the fitted scan, each scan with its own place and breath, and what the
-/// fitted parameters are uncertain by.
+/// Of the points of others.mask, all of scans that are not fitted: errors as in the fitted scan, each scan with its own
+/// place and breath, and what the fitted parameters are uncertain by.
 Whitening unfitted_whitening(calibration::Evaluator& evaluator, const FreeParameters& parameters,
                              const WeightedFit& fit, const ErrorSources& sources, const Metric& metric,
                              const Tolerances& tolerances, const Prediction& prediction, const OtherPoses& others) {
@@ -78,9 +88,13 @@ Whitening unfitted_whitening(calibration::Evaluator& evaluator, const FreeParame
   seen.prediction = prediction;
   seen.residuals = calibration::residuals_of(whole, prediction, others.mask, noise);
   std::vector<std::string> unseen;
-  const auto candidates = find_candidates(evaluator, model, seen, unseen, is_source_of_error);
+  const auto candidates = find_candidates(evaluator, model, seen, unseen, errors_imitate);
+  const auto& means = sources.unfitted_mean_mm;
+  // Where a scan is not corrected for the mesh the whole of its error is left, about as large as in the fitted one.
+  const double spread_mm = means.empty() ? std::hypot(sources.spread_mm, rms(sources.mean_mm)) : sources.spread_mm;
   ErrorSources errors =
-      error_sources(seen.residuals, candidates, nullptr, {0, sources.spread_mm, sources.length_mm}, tolerances);
+      error_sources(seen.residuals, candidates, nullptr, {0, spread_mm, sources.length_mm}, tolerances);
+  if (!means.empty()) errors.modes.push_back({"mesh", sources.mean_doubt * joined(points_of(means, others.mask))});
   const simulation::Sensitivities sensitivities(evaluator.chain(), model, prediction.solution);
   const Eigen::MatrixXd slope =
       calibration::linearise(evaluator, sensitivities, parameters, fit.fit.u, prediction, seen.residuals).slope;
@@ -93,7 +107,7 @@ Whitening unfitted_whitening(calibration::Evaluator& evaluator, const FreeParame
 }
 
 void weigh_unfitted(OtherPoses& others) {
-  const Eigen::VectorXd white = others.whitening->apply(joined(others));
+  const Eigen::VectorXd white = others.whitening->apply(joined(others.distance_mm));
   others.objective = white.squaredNorm();
   others.misfit = others.objective / static_cast<double>(white.size());
 }
@@ -108,8 +122,6 @@ bool says_the_scan_lies_elsewhere(const simulation::Model& model) {
   return std::any_of(model.effects.begin(), model.effects.end(),
                      [](const auto& effect) { return effect.name == "misregistration"; });
 }
-
-double rms(const Eigen::VectorXd& d) { return d.size() > 0 ? d.norm() / std::sqrt(static_cast<double>(d.size())) : 0; }
 
 }  // namespace
 

@@ -176,7 +176,7 @@ Refit summary(const RefitProblem& problem, Job& job) {
 }
 
 double hopeless_share_of(const std::string& effect) {
-  return tolerance_for(effect, {}, Tolerances{}) > 0 ? tolerated_hopeless_share : hopeless_share;
+  return errors_imitate(effect) ? tolerated_hopeless_share : hopeless_share;
 }
 
 template <class Work>

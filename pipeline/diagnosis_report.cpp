@@ -65,6 +65,8 @@ Json left_json(const diagnosis::LackOfFit& left) { return {{"misfit", left.misfi
 
 Json candidate_json(const Findings& found, const Score& score) {
   const Refit* refit = refit_of(found, score.effect);
+  const bool judged =
+      refit && found.others.unfitted > 0 && !refit->pose_rms_mm.empty() && refit->effect != "misregistration";
   return {
       {"effect", score.effect},
       {"p_value", score.p_value},
@@ -73,8 +75,8 @@ Json candidate_json(const Findings& found, const Score& score) {
       {"held_out_rms_mm", refit ? refit->held_out_rms_mm : score.predicted_held_out_rms_mm},
       {"held_out_pose_rms_mm", refit ? number_or_null(refit->pose_rms_mm) : Json(nullptr)},
       {"changes_pose_mm", refit ? number_or_null(refit->pose_change_mm) : Json(nullptr)},
-      {"pose_gain", refit && found.others.unfitted > 0 ? Json(refit->pose_gain) : Json(nullptr)},
-      {"pose_misfit", refit && found.others.unfitted > 0 ? Json(refit->pose_misfit) : Json(nullptr)},
+      {"pose_gain", judged ? Json(refit->pose_gain) : Json(nullptr)},
+      {"pose_misfit", judged ? Json(refit->pose_misfit) : Json(nullptr)},
       {"left", refit ? left_json(found.left[static_cast<std::size_t>(refit - found.refits.data())]) : Json(nullptr)},
       {"parameters", parameters_json(candidate_of(found, score.effect), score, refit)},
       {"not_told_apart_from", rivals_of(found, score.effect)},

@@ -83,11 +83,19 @@ TEST(Decide, AnUnfittedPoseThatComesOutFurtherOffSpeaksForNothing) {
   };
   EXPECT_EQ(with(4, 5, 0.9), Verdict::missing) << "another scan is proof of another kind";
   EXPECT_EQ(with(4, 5, 1.1), Verdict::unexplained);
+  EXPECT_EQ(with(4, -1, 0.9), Verdict::missing) << "37 % of what it has above the noise";
+  EXPECT_EQ(with(4, -1, 0.97), Verdict::unexplained) << "12 %";
   EXPECT_EQ(with(15, 5, 1.01), Verdict::missing) << "where it hardly shows it has no say";
-  EXPECT_EQ(with(15, -1, 0.9), Verdict::unexplained) << "or against it";
+  EXPECT_EQ(with(15, -1, 0.9), Verdict::missing);
+  EXPECT_EQ(with(15, -3, 0.9), Verdict::unexplained) << "or against it";
   EXPECT_EQ(with(60, -30, 1.1), Verdict::missing) << "unless the fitted one says far more";
   EXPECT_EQ(with(60, -50, 1.1), Verdict::unexplained);
   EXPECT_EQ(with(1, 50, 0.8), Verdict::unexplained) << "nothing in the fitted pose";
+  const auto without_equilibrium = [&base](double bic) {
+    return decide(table_with(0.001), {refit("ligament", bic, 0.8)}, {nothing_left}, base).verdict;
+  };
+  EXPECT_EQ(without_equilibrium(15), Verdict::unexplained);
+  EXPECT_EQ(without_equilibrium(30), Verdict::missing);
 }
 
 TEST(Decide, DoesNotNameWhatTheHeldOutErrorDoesNotConfirm) {
