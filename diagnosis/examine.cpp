@@ -111,12 +111,13 @@ bool is_quiet(const Findings& found, const VerdictRules& rules) {
 
 /// @param corrected  by what finer elements change there
 void judge_by_other_poses(const Subject& subject, const ExamineOptions& options, bool corrected, Findings& found) {
-  if (corrected && found.numerical) {
+  const bool any = subject.whole.measurements.size() > subject.fitted.measurements.size();
+  if (any && corrected && found.numerical) {
     tell(options, "finer mesh in poses that are not fitted");
     for (const Eigen::VectorXd& change : measure_unfitted_error(subject.whole, *found.numerical))
       found.sources.unfitted_mean_mm.push_back(options.tolerances.correction * change);
   }
-  tell(options, "poses that are not fitted");
+  if (any) tell(options, "poses that are not fitted");
   found.others = other_poses_of_base(subject.whole, FreeParameters(subject.model), found.base, found.sources,
                                      found.metric, options.tolerances);
   found.figures.pose_rms_mm = found.others.rms_mm();

@@ -22,12 +22,16 @@ Subject subject_of(const Twin& twin) {
 }
 
 /// Scan and model share their mesh here, so there is no numerical error to be measured.
-std::unique_ptr<Findings> findings_of(const Twin& twin, int refits = 6) {
+std::unique_ptr<Findings> findings_of(const Subject& subject, int refits = 6) {
   ExamineOptions options;
   options.other_meshes = false;
   options.refits = refits;
   options.tolerances = {0.05, 0.001, 0.05, 0.05, 1};
-  return examine(subject_of(twin), options);
+  return examine(subject, options);
+}
+
+std::unique_ptr<Findings> findings_of(const Twin& twin, int refits = 6) {
+  return findings_of(subject_of(twin), refits);
 }
 
 simulation::Model with(const std::string& effect, const std::string& parameter, double value) {
@@ -121,12 +125,22 @@ TEST_F(NullTwin, NoHotSpotWithoutDistance) {
   EXPECT_TRUE(find_hot_spots(skin, skin_error(skin, r, found->base.fit.prediction, 0), {}, "supine").empty());
 }
 
-TEST(TwinDiagnosis, ALigamentIsAmongWhatIsNamed) {
-  const Twin twin({with("ligament", "stiffness_kpa_per_mm", 2.0), noise_mm});
-  const auto found = findings_of(twin, 3);
+TEST(TwinDiagnosis, ALigamentIsAmongWhatIsNamedAndAnotherScanBearsItOut) {
+  const simulation::Model truth = with("ligament", "stiffness_kpa_per_mm", 2.0);
+  const Twin twin({truth, noise_mm}), again({truth, noise_mm, 2});
+  Subject subject = subject_of(twin);
+  subject.whole.measurements.push_back(again.measurement.get());
+  const auto found = findings_of(subject, 3);
   EXPECT_TRUE(found->diagnosis.verdict == Verdict::missing || found->diagnosis.verdict == Verdict::ambiguous)
       << found->diagnosis.why;
   EXPECT_TRUE(names(found->diagnosis, "ligament"));
+  ASSERT_EQ(found->figures.unfitted_poses, 1u);
+  for (const Refit& refit : found->refits)
+    if (refit.effect == "ligament") {
+      EXPECT_GT(refit.pose_gain, 10);
+      EXPECT_LT(refit.pose_misfit, found->others.misfit);
+      EXPECT_LT(refit.pose_rms_mm.at(0), found->figures.pose_rms_mm.at(0));
+    }
 }
 
 TEST(TwinDiagnosis, TheMapOfMissingForcesShowsATractionAndStaysBelowItsThresholdWithoutOne) {
