@@ -25,7 +25,7 @@ simulation::ChainSolution start_of(const Scene& whole, const WeightedFit& fit, c
   simulation::ChainSolution start = fit.fit.prediction.solution;
   for (std::size_t first = fitted_poses(fit), m = first; m < whole.measurements.size(); ++m) {
     Points x = start.X;
-    if (base != nullptr && !base->solved.empty()) x += base->solved[m - first].x - base->X;
+    if (base != nullptr) x += base->solved[m - first].x - base->X;
     start.poses.push_back({.name = whole.measurements[m]->pose.name, .x = std::move(x), .report = {}});
   }
   return start;
@@ -34,7 +34,7 @@ simulation::ChainSolution start_of(const Scene& whole, const WeightedFit& fit, c
 /// Points over the skin of the poses from @p first on.
 calibration::PointMask points_from(std::size_t first, const Prediction& prediction) {
   calibration::PointMask mask = calibration::points_over_skin(prediction);
-  for (std::size_t m = 0; m < std::min(first, mask.size()); ++m) mask[m].setConstant(false);
+  for (std::size_t m = 0; m < first; ++m) mask[m].setConstant(false);
   return mask;
 }
 
@@ -90,8 +90,11 @@ Whitening unfitted_whitening(calibration::Evaluator& evaluator, const FreeParame
   std::vector<std::string> unseen;
   const auto candidates = find_candidates(evaluator, model, seen, unseen, errors_imitate);
   const auto& means = sources.unfitted_mean_mm;
-  // Where a scan is not corrected for the mesh the whole of its error is left, about as large as in the fitted one.
-  const double spread_mm = means.empty() ? std::hypot(sources.spread_mm, rms(sources.mean_mm)) : sources.spread_mm;
+  // Where a scan is not corrected for the mesh the whole of its error is left, about as large as in the fitted one, of
+  // which the spread has the doubtful share already.
+  const double in_full_mm =
+      std::sqrt(std::max(0.0, 1 - sources.mean_doubt * sources.mean_doubt)) * rms(sources.mean_mm);
+  const double spread_mm = means.empty() ? std::hypot(sources.spread_mm, in_full_mm) : sources.spread_mm;
   ErrorSources errors =
       error_sources(seen.residuals, candidates, nullptr, {0, spread_mm, sources.length_mm}, tolerances);
   if (!means.empty()) errors.modes.push_back({"mesh", sources.mean_doubt * joined(points_of(means, others.mask))});

@@ -61,12 +61,16 @@ Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, 
 
 Json number_or_null(const std::vector<double>& values) { return values.empty() ? Json(nullptr) : Json(values); }
 
+/// A scan that lies elsewhere says nothing of where another one lies.
+bool unfitted_scans_judge(const Findings& found, const Refit& refit) {
+  return found.others.unfitted > 0 && !refit.pose_rms_mm.empty() && refit.effect != "misregistration";
+}
+
 Json left_json(const diagnosis::LackOfFit& left) { return {{"misfit", left.misfit}, {"p_value", left.p_value}}; }
 
 Json candidate_json(const Findings& found, const Score& score) {
   const Refit* refit = refit_of(found, score.effect);
-  const bool judged =
-      refit && found.others.unfitted > 0 && !refit->pose_rms_mm.empty() && refit->effect != "misregistration";
+  const bool judged = refit && unfitted_scans_judge(found, *refit);
   return {
       {"effect", score.effect},
       {"p_value", score.p_value},
@@ -161,8 +165,8 @@ void say_refits(const Run& run, const Findings& found) {
       run.say(fmt::format(
           "  {:<20}{:>9.1f}{:>8.3f}{:>10.3f}{:>10}{:>8}{:>8.2f}   {}{}", refit.effect, refit.bic, refit.rms_mm,
           refit.held_out_rms_mm, refit.pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", refit.pose_rms_mm[0]),
-          found.others.unfitted == 0 || refit.pose_rms_mm.empty() ? "-" : fmt::format("{:.1f}", refit.pose_gain),
-          found.left[r].misfit, values_of(refit.parameters), refit.finished ? "" : " (given up early)"));
+          unfitted_scans_judge(found, refit) ? fmt::format("{:.1f}", refit.pose_gain) : "-", found.left[r].misfit,
+          values_of(refit.parameters), refit.finished ? "" : " (given up early)"));
   }
 }
 
