@@ -161,7 +161,7 @@ RefitProblem refit_problem(const Subject& subject, const Findings& found,
 
 std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& options) {
   auto found = std::make_unique<Findings>();
-  calibration::Evaluator evaluator(subject.fitted, subject.model);
+  calibration::Evaluator evaluator(subject.fitted, subject.model, accurate_enough());
   fit_base(subject, evaluator, options, *found);
   calibration::Residuals corrected = found->base.fit.residuals;
   corrected.distance_mm += found->sources.mean_mm;

@@ -30,7 +30,7 @@ Errors errors_with(const calibration::Scene& scene, const ErrorSources& sources,
   Errors errors{without_tolerance_for(refit.effect, sources), {}};
   if (base != nullptr) {
     try {
-      set_numerical(measure_numerical_error(scene, refit.model, refit.fit.fit, base), tolerances, errors.sources);
+      set_numerical(measure_finer_again(scene, refit.model, refit.fit.fit, *base), tolerances, errors.sources);
     } catch (const NumericalFailure&) {
       // No other mesh carries this model: what was measured without the effect has to do.
     }
@@ -71,7 +71,7 @@ class Profile {
     simulation::find_setting(model, parameters_.names()[static_cast<std::size_t>(which_)])->free = false;
     try {
       const FreeParameters rest(model);
-      calibration::Evaluator evaluator(scene_, model);
+      calibration::Evaluator evaluator(scene_, model, accurate_enough());
       WeightedFit fit = weigh(evaluator, rest, metric_, rest.start(), &least_.fit.prediction.solution);
       DescentOptions few;
       few.max_iterations = 2;
@@ -135,7 +135,7 @@ void settle(const calibration::Scene& scene, const ErrorSources& sources, const 
   now.whitening = &errors.whitening, now.mean_mm = errors.sources.mean_mm;
   const FreeParameters parameters(refit.model);
   WeightedFit fit = refit.fit;
-  calibration::Evaluator evaluator(scene, refit.model);
+  calibration::Evaluator evaluator(scene, refit.model, accurate_enough());
   weigh_again(parameters, now, fit);
   descend(evaluator, parameters, now, DescentOptions{}, fit);
   refit.parameters = linear_intervals(refit.effect, fit, parameters, now);

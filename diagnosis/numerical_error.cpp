@@ -8,6 +8,7 @@
 #include "calibration/error_model.h"
 #include "common/error.h"
 #include "diagnosis/other_mesh.h"
+#include "diagnosis/weighted_fit.h"
 #include "meshing/topology.h"
 
 namespace supine::diagnosis {
@@ -58,8 +59,8 @@ simulation::ChainSolution followed(const meshing::TetMesh& quadratic, const Nume
 /// Enough for a change of tenths of a millimetre.
 simulation::SolveOptions enough() {
   simulation::SolveOptions options;
-  options.step_tolerance_mm = 1e-3;
-  options.residual_tolerance = 1e-3;
+  options.step_tolerance_mm = 0.02;  // the next Newton step is shorter many times over
+  options.residual_tolerance = 3e-3;
   options.smallest_load_step = 0.125;  // a shape that is hard to reach is no measure of the mesh's error
   return options;
 }
@@ -142,6 +143,25 @@ Eigen::VectorXd share_around(const Residuals& residuals, const Eigen::VectorXd& 
   return share / std::sqrt(mean_square(share));
 }
 
+/// Fills what follows from the two changes. @throws NumericalFailure  neither mesh gave an answer
+void summarise(const calibration::Scene& scene, const Residuals& residuals, NumericalError& result) {
+  const bool finer = result.finer_failure.empty(), coarser = result.coarser_failure.empty();
+  if (!finer && !coarser)
+    throw NumericalFailure("the error of the mesh cannot be measured: finer mesh: " + result.finer_failure +
+                           "; coarser mesh: " + result.coarser_failure);
+  result.finer_doubt = scene.mesh->order() == 1 ? order_doubt : 1;
+  if (!finer) result.finer_mm = Eigen::VectorXd::Zero(residuals.size());
+  if (!coarser) result.coarser_mm = Eigen::VectorXd::Zero(residuals.size());
+  const double twice = finer && coarser ? 1 : 2;
+  const Eigen::VectorXd square =
+      std::pow(result.finer_doubt, 2) * result.finer_mm.cwiseAbs2() + result.coarser_mm.cwiseAbs2();
+  result.spread_mm = std::sqrt(twice * square.mean());
+  result.share = share_around(residuals, square);
+  result.length_mm = 0.5 * twice *
+                     ((finer ? correlation_length_mm(residuals, result.finer_mm) : 0) +
+                      (coarser ? correlation_length_mm(residuals, result.coarser_mm) : 0));
+}
+
 }  // namespace
 
 double correlation_length_mm(const Residuals& residuals, const Eigen::VectorXd& field) {
@@ -168,34 +188,32 @@ double correlation_length_mm(const Residuals& residuals, const Eigen::VectorXd& 
 NumericalError measure_numerical_error(const calibration::Scene& scene, const simulation::Model& model,
                                        const calibration::Fit& fit, const NumericalError* near) {
   NumericalError result;
-  result.finer_doubt = scene.mesh->order() == 1 ? order_doubt : 1;
-  result.finer_mm = result.coarser_mm = Eigen::VectorXd::Zero(fit.residuals.size());
-  std::string reason[2];
-#pragma omp parallel for schedule(static, 1)
-  for (int k = 0; k < 2; ++k) {
+#pragma omp parallel sections
+  {
+#pragma omp section
     try {
-      if (k == 0)
-        measure_finer(scene, model, fit, near, result);
-      else
-        result.coarser_mm = change_of(
-            fit.residuals,
-            predicted_on(scene, coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share), model, nullptr, enough()));
+      measure_finer(scene, model, fit, near, result);
     } catch (const std::exception& failure) {
-      reason[k] = std::string(k == 0 ? "finer" : "coarser") + " mesh: " + failure.what();
+      result.finer_failure = failure.what();
+    }
+#pragma omp section
+    try {
+      const meshing::TetMesh mesh = coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share);
+      result.coarser_mm = change_of(fit.residuals, predicted_on(scene, mesh, model, nullptr, enough()));
+    } catch (const std::exception& failure) {
+      result.coarser_failure = failure.what();
     }
   }
-  for (const std::string& r : reason)
-    if (!r.empty()) result.failed.push_back(r);
-  if (result.failed.size() == 2)
-    throw NumericalFailure("the error of the mesh cannot be measured: " + reason[0] + "; " + reason[1]);
-  const double twice = result.failed.empty() ? 1 : 2;
-  const Eigen::VectorXd square =
-      std::pow(result.finer_doubt, 2) * result.finer_mm.cwiseAbs2() + result.coarser_mm.cwiseAbs2();
-  result.spread_mm = std::sqrt(twice * square.mean());
-  result.share = share_around(fit.residuals, square);
-  result.length_mm = 0.5 * twice *
-                     ((reason[0].empty() ? correlation_length_mm(fit.residuals, result.finer_mm) : 0) +
-                      (reason[1].empty() ? correlation_length_mm(fit.residuals, result.coarser_mm) : 0));
+  summarise(scene, fit.residuals, result);
+  return result;
+}
+
+NumericalError measure_finer_again(const calibration::Scene& scene, const simulation::Model& model,
+                                   const calibration::Fit& fit, const NumericalError& before) {
+  NumericalError result;
+  result.coarser_mm = before.coarser_mm, result.coarser_failure = before.coarser_failure;
+  measure_finer(scene, model, fit, &before, result);
+  summarise(scene, fit.residuals, result);
   return result;
 }
 
@@ -211,7 +229,8 @@ std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& wh
     simulation::ChainSolution linear = fitted.given;
     for (std::size_t m = count; m < whole.measurements.size(); ++m)
       linear.poses.push_back({.name = whole.measurements[m]->pose.name, .x = linear.X, .report = {}});
-    const calibration::Prediction given = calibration::Evaluator(whole, fitted.model).predict(fitted.model, &linear);
+    const calibration::Prediction given =
+        calibration::Evaluator(whole, fitted.model, accurate_enough()).predict(fitted.model, &linear);
     // As far from the undeformed shape as with linear elements: from where these have the pose, or from the undeformed
     // shape, it takes up to twice the work.
     simulation::ChainSolution start = fitted.finer;

@@ -17,7 +17,8 @@ struct NumericalError {
   double spread_mm = 0;        ///< rms of finer_doubt × finer_mm and coarser_mm: what is left when finer_mm was added
   Eigen::VectorXd share;       ///< #R, of the spread at each point: what the places around it show; mean square 1
   double length_mm = 0;        ///< over which it is alike
-  std::vector<std::string> failed;  ///< why a mesh gave no answer; its column is zero and the other counts twice
+  /// Why a mesh gave no answer, or empty; where it gave none its column is zero and the other counts twice.
+  std::string finer_failure, coarser_failure;
   /// Of linear elements: what finer_mm comes from, to start the next one from.
   simulation::Model model;
   simulation::ChainSolution given, finer;
@@ -31,6 +32,13 @@ struct NumericalError {
 /// @throws NumericalFailure  neither mesh gave an answer
 NumericalError measure_numerical_error(const calibration::Scene& scene, const simulation::Model& model,
                                        const calibration::Fit& fit, const NumericalError* near = nullptr);
+
+/// The same for a model of one effect more than that of @p before: finer elements anew, from there; coarser_mm, which
+/// counts as an error of that size and corrects nothing, as it was.
+/// @pre  the fit has the points that @p before was measured at
+/// @throws NumericalFailure  the finer mesh gave no answer
+NumericalError measure_finer_again(const calibration::Scene& scene, const simulation::Model& model,
+                                   const calibration::Fit& fit, const NumericalError& before);
 
 /// Change of distance that finer elements make for every scan point of the measurements that are not fitted, in the
 /// order of the scene; 0 where the point lies beyond the border. Empty for quadratic meshes, and where a pose does not

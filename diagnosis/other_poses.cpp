@@ -147,7 +147,7 @@ OtherPoses other_poses_of_base(const Scene& whole, const FreeParameters& paramet
   const simulation::Model model = parameters.model(fit.fit.u);
   const std::size_t first = fitted_poses(fit);
   if (!says_the_scan_lies_elsewhere(model) && whole.measurements.size() > first) try {
-      calibration::Evaluator evaluator(whole, model);
+      calibration::Evaluator evaluator(whole, model, accurate_enough());
       const simulation::ChainSolution start = start_of(whole, fit, nullptr);
       const Prediction prediction = evaluator.predict(model, &start);
       others.mask = points_from(first, prediction);
@@ -174,7 +174,7 @@ OtherPoses other_poses_of_refit(const Scene& whole, const FreeParameters& parame
   if (base.unfitted > 0) try {
       const simulation::Model model = parameters.model(fit.fit.u);
       const simulation::ChainSolution start = start_of(whole, fit, &base);
-      keep(fit, calibration::Evaluator(whole, model).predict(model, &start), sources, others);
+      keep(fit, calibration::Evaluator(whole, model, accurate_enough()).predict(model, &start), sources, others);
       weigh_unfitted(others);
     } catch (const NumericalFailure&) {
       return {};

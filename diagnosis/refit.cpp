@@ -110,7 +110,7 @@ void begin(const RefitProblem& problem, Job& job) {
   job.whitening = Whitening::of(problem.base->fit.residuals, without_tolerance_for(job.effect, *problem.sources));
   job.metric = *problem.metric;
   job.metric.whitening = &job.whitening;
-  job.evaluator = std::make_unique<calibration::Evaluator>(problem.scene, job.model);
+  job.evaluator = std::make_unique<calibration::Evaluator>(problem.scene, job.model, accurate_enough());
   const simulation::ChainSolution& near = problem.base->fit.prediction.solution;
   for (const Eigen::VectorXd& u : job.starts) {
     try {

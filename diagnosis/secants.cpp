@@ -16,7 +16,7 @@ void find_secants(const RefitProblem& problem, std::vector<Candidate>& candidate
     simulation::Model model = *problem.model;
     model.effects.push_back(free_setting(candidates[c].effect));
     try {
-      calibration::Evaluator evaluator(problem.scene, model);
+      calibration::Evaluator evaluator(problem.scene, model, accurate_enough());
       const calibration::Prediction moved = evaluator.predict(model, &base.prediction.solution);
       const auto there = calibration::residuals_of(problem.scene, moved, base.mask, problem.metric->noise_mm);
       candidates[c].secant = there.distance_mm - base.residuals.distance_mm;

@@ -88,6 +88,13 @@ Eigen::VectorXd step_of(const FreeParameters& parameters, const Rows& rows, cons
 
 }  // namespace
 
+simulation::SolveOptions accurate_enough() {
+  simulation::SolveOptions options;
+  options.step_tolerance_mm = 1e-5;
+  options.residual_tolerance = 1e-8;
+  return options;
+}
+
 WeightedFit weigh(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
                   const Eigen::VectorXd& u, const simulation::ChainSolution* near) {
   WeightedFit result = predicted(evaluator, parameters, metric, u, near);

@@ -28,6 +28,9 @@ struct DescentOptions {
   double settled = 0.2;  ///< stop when the next step promises to lower F by less
 };
 
+/// Of all solves whose distances are compared with a scan: hundredths of a micrometre are nothing beside its noise.
+simulation::SolveOptions accurate_enough();
+
 /// F and its slopes at given coordinates. @throws NumericalFailure  no equilibrium
 WeightedFit weigh(calibration::Evaluator& evaluator, const calibration::FreeParameters& parameters,
                   const Metric& metric, const Eigen::VectorXd& u, const simulation::ChainSolution* near);

@@ -111,6 +111,15 @@ Json budget_json(const diagnosis::ErrorBudget& b) {
           {"numerical", b.numerical}, {"parameters", b.parameters}, {"model_form", b.model_form}};
 }
 
+Json numerical_json(const Findings& found) {
+  if (!found.numerical) return {{"failed", found.numerical_failure}};
+  Json failed = Json::array();
+  const diagnosis::NumericalError& error = *found.numerical;
+  if (!error.finer_failure.empty()) failed.push_back("finer mesh: " + error.finer_failure);
+  if (!error.coarser_failure.empty()) failed.push_back("coarser mesh: " + error.coarser_failure);
+  return {{"spread_mm", found.sources.spread_mm}, {"length_mm", found.sources.length_mm}, {"failed", failed}};
+}
+
 Json forces_json(const Findings& found) {
   if (!found.forces) return nullptr;
   const diagnosis::ForceMap& map = *found.forces;
@@ -310,10 +319,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["missing_force"] = forces_json(found);
   f["effective_points"] = found.table.effective_points;
   f["noise_mm"] = found.figures.noise_mm;
-  f["numerical"] = found.numerical ? Json{{"spread_mm", found.sources.spread_mm},
-                                          {"length_mm", found.sources.length_mm},
-                                          {"failed", found.numerical->failed}}
-                                   : Json{{"failed", found.numerical_failure}};
+  f["numerical"] = numerical_json(found);
   return f;
 }
 

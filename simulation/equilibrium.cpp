@@ -27,10 +27,12 @@ constexpr double crushed_step_factor = 4;  // where elements are crushed, smalle
 using Flat = Eigen::Map<Eigen::VectorXd>;
 
 /// Forcing term of an inexact Newton method that keeps quadratic convergence (Eisenstat and Walker 1996, choice 2),
-/// never finer than what the last digits need.
-double linear_tolerance(double residual_share, double share_before) {
+/// never finer than what the last digits need, or than what ends the solve at @p wanted_share.
+double linear_tolerance(double residual_share, double share_before, double wanted_share) {
+  constexpr double finest = 1e-6, coarsest = 1e-2, well_under = 0.3;
   const double ratio = residual_share / share_before;
-  return std::clamp(0.1 * ratio * ratio, 1e-6, 1e-2);
+  const double quadratic = std::clamp(0.1 * ratio * ratio, finest, coarsest);
+  return std::max(quadratic, std::min(well_under * wanted_share / residual_share, 10 * coarsest));
 }
 
 }  // namespace
@@ -228,7 +230,7 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Poin
     if (iteration == options_.max_iterations) return give_up(stalled(iteration, attempt.residual_share));
     ++attempt.iterations;
     const State state = state_of(unknown, known, sought, load);
-    const double tolerance = linear_tolerance(attempt.residual_share, share_before);
+    const double tolerance = linear_tolerance(attempt.residual_share, share_before, options_.residual_tolerance);
     share_before = attempt.residual_share;
     const bool found = unknown == Unknown::deformed ? direction_.deformed(state, tolerance, moved, sums_, step)
                                                     : direction_.undeformed(state, tolerance, sums_, step);

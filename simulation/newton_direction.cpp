@@ -8,9 +8,11 @@ namespace supine::simulation {
 namespace {
 
 constexpr int max_gmres = 120;
+constexpr double shift_growth = 6;
 constexpr int max_conjugate_gradients = 200;
 constexpr double close_mm = 1;            // a kept factor is worth trying on a small mesh after steps shorter than this
 constexpr double usable_reduction = 0.5;  // a linear solve that got this far is still a direction
+constexpr double worth_reduction = 0.1;   // and this far with a kept factor saves a new one
 
 }  // namespace
 
@@ -59,7 +61,8 @@ double NewtonDirection::natural_mm(const Eigen::VectorXd& residual) {
 bool NewtonDirection::factorise(const State& state, double tolerance, Sums& sums, Eigen::VectorXd* step) {
   if (!factor_) factor_ = make_spd_solver(sums.tangent, mechanics_.mesh().points);
   // The exact tangent where it is positive definite; where it is not, the one without the skin's negative curvature;
-  // and if the tissue's is negative too, with the smallest shift that makes it so.
+  // and if the tissue's is negative too, with a shift that makes it so and is not much
+  // larger than it has to be.
   double shift = 0;
   have_factor_ = true;
   for (int attempt = 0; attempt < 10; ++attempt) {
@@ -74,12 +77,17 @@ bool NewtonDirection::factorise(const State& state, double tolerance, Sums& sums
         found = by_conjugate_gradients(tolerance, shift, max_conjugate_gradients, sums, *step);
       }
       outworn_ = attempt > 0;  // a changed tangent is good for this step only
-      if (found) return true;
+      if (found) {
+        if (attempt > 0) shift_ = shift;
+        return true;
+      }
     }
     if (attempt == 0)
       mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true, .convex = true}, sums);
+    else if (attempt == 1)
+      shift = std::max(1e-4 * sums.tangent.diagonal().cwiseAbs().mean(), shift_ / shift_growth);
     else
-      shift = attempt == 1 ? 1e-4 * sums.tangent.diagonal().cwiseAbs().mean() : 6 * shift;
+      shift *= shift_growth;
   }
   have_factor_ = false;
   return false;
@@ -95,7 +103,8 @@ bool NewtonDirection::by_conjugate_gradients(double tolerance, double shift, int
   const KrylovReport report =
       krylov_.conjugate_gradients(matrix, preconditioner, -sums.residual, tolerance, most, step);
   outworn_ = 2 * report.iterations > most;
-  return report.converged && step.allFinite();
+  const bool usable = report.converged || (!report.negative_curvature && report.reduction <= worth_reduction);
+  return usable && step.allFinite();
 }
 
 bool NewtonDirection::by_gmres(const SparseMatrix& matrix, double sign, double tolerance, const Sums& sums,

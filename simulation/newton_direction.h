@@ -35,7 +35,7 @@ class NewtonDirection {
   double natural_mm(const Eigen::VectorXd& residual);
 
   /// Forgets the kept factor, so that what follows does not depend on what was solved before.
-  void forget() { have_factor_ = false; }
+  void forget() { have_factor_ = false, shift_ = 0; }
 
   /// Whether the last step came from the exact tangent: its length then says how far the answer is.
   bool exact() const { return exact_; }
@@ -53,6 +53,7 @@ class NewtonDirection {
   bool have_factor_ = false;
   bool outworn_ = false;  // the last Krylov solve cost more than a new factor would
   bool exact_ = true;
+  double shift_ = 0;  // of the tangent that was factorised last when the exact one was not positive definite
   int factorisations_ = 0;
 };
 
