@@ -38,6 +38,14 @@ calibration::PointMask points_from(std::size_t first, const Prediction& predicti
   return mask;
 }
 
+/// Names the first pose from @p first on that has no point in the mask; empty where all have.
+std::string without_points(const Scene& whole, std::size_t first, const calibration::PointMask& mask) {
+  for (std::size_t m = first; m < mask.size(); ++m)
+    if (!mask[m].any())
+      return "no point of the scan " + whole.measurements[m]->pose.name + " lies over the model's skin";
+  return {};
+}
+
 /// What all points of the last measurements have, of those in the mask.
 std::vector<Eigen::VectorXd> points_of(const std::vector<Eigen::VectorXd>& last, const calibration::PointMask& mask) {
   std::vector<Eigen::VectorXd> kept;
@@ -151,15 +159,17 @@ OtherPoses other_poses_of_base(const Scene& whole, const FreeParameters& paramet
       const simulation::ChainSolution start = start_of(whole, fit, nullptr);
       const Prediction prediction = evaluator.predict(model, &start);
       others.mask = points_from(first, prediction);
-      if (std::any_of(others.mask.begin(), others.mask.end(), [](const auto& points) { return points.any(); })) {
+      others.failure = without_points(whole, first, others.mask);
+      if (others.failure.empty()) {
         others.unfitted = whole.measurements.size() - first;
         keep(fit, prediction, sources, others);
         others.whitening = std::make_shared<Whitening>(
             unfitted_whitening(evaluator, parameters, fit, sources, metric, tolerances, prediction, others));
         weigh_unfitted(others);
       }
-    } catch (const NumericalFailure&) {
-      others = {};  // that pose has no equilibrium: it says nothing
+    } catch (const NumericalFailure& failure) {
+      others = {};
+      others.failure = failure.what();
     }
   add_left_out(parameters, fit, sources, others);
   return others;

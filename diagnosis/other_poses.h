@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "diagnosis/error_sources.h"
@@ -23,6 +24,7 @@ struct OtherPoses {
   std::shared_ptr<const Whitening> whitening;    ///< L⁻¹
   std::vector<simulation::PoseSolution> solved;  ///< of the poses that are not fitted
   Points X;                                      ///< undeformed nodes of these, mm
+  std::string failure;  ///< why no pose that is not fitted judges although there are some; empty where they do
 
   /// Root mean square of each.
   std::vector<double> rms_mm() const;
@@ -30,9 +32,9 @@ struct OtherPoses {
   std::vector<double> change_mm(const OtherPoses& other) const;
 };
 
-/// Every pose that is not fitted and can judge a model, then each fitted one left out (left_out_pose.h), where several
-/// are. Where the model says that the fitted scan lies elsewhere the former judge nothing, because another scan lies
-/// elsewhere in its own way.
+/// Every pose that is not fitted, then each fitted one left out (left_out_pose.h), where several are. The former judge
+/// only where each has an equilibrium and points over the skin. Where the model says that the fitted scan lies
+/// elsewhere the former judge nothing, because another scan lies elsewhere in its own way.
 /// @param whole   the fitted scene and, after its measurements, those that are not fitted
 /// @param metric  of the fit
 OtherPoses other_poses_of_base(const calibration::Scene& whole, const calibration::FreeParameters& parameters,

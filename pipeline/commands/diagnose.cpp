@@ -74,6 +74,7 @@ class DiagnoseTool : public Tool {
     auto found = diagnosis::examine(subject_of(*measured, measured->model, noise), options_);
     if (!found->numerical)
       run.warn("the error of the mesh is guessed from the residual (" + found->numerical_failure + ")");
+    if (!found->others.failure.empty()) run.warn("scans that are not fitted judge nothing: " + found->others.failure);
     run.stage("next measurement");
     live.show("further measurements");
     const DiagnosisResult result = complete(*measured, std::move(found));
