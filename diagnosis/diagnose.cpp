@@ -42,13 +42,13 @@ std::size_t unfitted_judges(const Refit& refit, const BaseFigures& base) {
 /// squares; none without such a pose.
 std::optional<double> fall(const Refit& refit, const BaseFigures& base, std::size_t first, std::size_t end) {
   if (refit.pose_rms_mm.size() != base.pose_rms_mm.size() || end <= first) return {};
-  const auto excess = [&](const std::vector<double>& poses) {
-    double sum = 0;
-    for (std::size_t i = first; i < end; ++i) sum += poses[i] * poses[i] - base.noise_mm * base.noise_mm;
-    return sum / static_cast<double>(end - first);
-  };
-  const double before = excess(base.pose_rms_mm), after = excess(refit.pose_rms_mm);
-  return (before - after) / std::max(before, 0.01 * base.noise_mm * base.noise_mm);
+  const bool each = base.pose_noise_mm.size() == base.pose_rms_mm.size();
+  double before = 0, after = 0, noise = 0;
+  for (std::size_t i = first; i < end; ++i) {
+    before += std::pow(base.pose_rms_mm[i], 2), after += std::pow(refit.pose_rms_mm[i], 2);
+    noise += std::pow(each ? base.pose_noise_mm[i] : base.noise_mm, 2);
+  }
+  return (before - after) / std::max(before - noise, 0.01 * noise);
 }
 
 std::optional<double> fall_of_left_out(const Refit& refit, const BaseFigures& base) {

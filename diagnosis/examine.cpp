@@ -120,7 +120,7 @@ void judge_by_other_poses(const Subject& subject, const ExamineOptions& options,
   if (any) tell(options, "poses that are not fitted");
   found.others = other_poses_of_base(subject.whole, FreeParameters(subject.model), found.base, found.sources,
                                      found.metric, options.tolerances);
-  found.figures.pose_rms_mm = found.others.rms_mm();
+  found.figures.pose_rms_mm = found.others.rms_mm(), found.figures.pose_noise_mm = found.others.noise_mm;
   found.figures.unfitted_poses = found.others.unfitted;
 }
 
@@ -161,18 +161,16 @@ RefitProblem refit_problem(const Subject& subject, const Findings& found,
 
 std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& options) {
   auto found = std::make_unique<Findings>();
+  found->tolerances = options.tolerances;
   calibration::Evaluator evaluator(subject.fitted, subject.model, accurate_enough());
   fit_base(subject, evaluator, options, *found);
-  calibration::Residuals corrected = found->base.fit.residuals;
-  corrected.distance_mm += found->sources.mean_mm;
   const RefitProblem problem = refit_problem(subject, *found, options.progress);
-  if (options.refits > 0) {
-    tell(options, "effects at their usual size");
-    find_secants(problem, found->candidates);
-  }
+  tell(options, "effects at their usual size");
+  find_secants(problem, found->candidates);
   tell(options, "scores");
-  found->table = score_candidates(corrected, found->base.fit.linearisation.slope, found->candidates, found->whitening,
-                                  options.seed);
+  found->table =
+      score_candidates(found->base.fit.residuals, found->sources.mean_mm, found->base.fit.linearisation.slope,
+                       found->candidates, found->whitening, options.seed);
   judge_base(subject, *found);
   const bool quiet = is_quiet(*found, options.rules);
   judge_by_other_poses(subject, options, !quiet || options.correct_quiet_poses, *found);

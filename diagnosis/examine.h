@@ -42,6 +42,7 @@ struct Findings {
   Metric metric;  ///< points into this object
   Whitening whitening;
   ErrorSources sources;
+  Tolerances tolerances;                    ///< of the sources
   OtherPoses others;                        ///< the base model in poses that it was not fitted to
   std::optional<NumericalError> numerical;  ///< none where no other mesh was tried, or none gave an answer
   std::string numerical_failure;            ///< why not

@@ -48,7 +48,7 @@ void widen(double sd, FittedParameter& p) {
   p.high = std::min(row.upper, p.value + std::hypot(p.high - p.value, more));
 }
 
-/// F above its least when one parameter is held and the others are fitted again.
+/// F above its least when one parameter, which has no prior, is held and the others are fitted again.
 class Profile {
  public:
   Profile(const calibration::Scene& scene, const Metric& metric, const FreeParameters& parameters,
@@ -67,12 +67,13 @@ class Profile {
   double rise(double step) const {
     Eigen::VectorXd u = least_.fit.u + step * others_;
     u[which_] = least_.fit.u[which_] + step;
-    simulation::Model model = parameters_.model(parameters_.clamped(u));
-    simulation::find_setting(model, parameters_.names()[static_cast<std::size_t>(which_)])->free = false;
+    u = parameters_.clamped(u);
+    const FreeParameters rest = with_one_held(u[which_]);
+    Eigen::VectorXd start(rest.size());
+    for (Eigen::Index i = 0; i < start.size(); ++i) start[i] = u[i < which_ ? i : i + 1];
     try {
-      const FreeParameters rest(model);
-      calibration::Evaluator evaluator(scene_, model, accurate_enough());
-      WeightedFit fit = weigh(evaluator, rest, metric_, rest.start(), &least_.fit.prediction.solution);
+      calibration::Evaluator evaluator(scene_, rest.base(), accurate_enough());
+      WeightedFit fit = weigh(evaluator, rest, metric_, start, &least_.fit.prediction.solution);
       DescentOptions few;
       few.max_iterations = 2;
       descend(evaluator, rest, metric_, few, fit);
@@ -83,6 +84,17 @@ class Profile {
   }
 
  private:
+  /// The others free, with the priors they have.
+  FreeParameters with_one_held(double coordinate) const {
+    const std::string& name = parameters_.names()[static_cast<std::size_t>(which_)];
+    simulation::Model model = parameters_.base();
+    simulation::Setting& held = *simulation::find_setting(model, name);
+    held.value = parameters_.value(which_, coordinate), held.free = false;
+    std::vector<std::string> rest = parameters_.names();
+    rest.erase(rest.begin() + which_);
+    return FreeParameters(std::move(model), std::move(rest));
+  }
+
   const calibration::Scene& scene_;
   const Metric& metric_;
   const FreeParameters& parameters_;
@@ -133,7 +145,7 @@ void settle(const calibration::Scene& scene, const ErrorSources& sources, const 
   const Errors errors = errors_with(scene, sources, numerical, tolerances, refit);
   Metric now = metric;
   now.whitening = &errors.whitening, now.mean_mm = errors.sources.mean_mm;
-  const FreeParameters parameters(refit.model);
+  const FreeParameters parameters(refit.given);
   WeightedFit fit = refit.fit;
   calibration::Evaluator evaluator(scene, refit.model, accurate_enough());
   weigh_again(parameters, now, fit);

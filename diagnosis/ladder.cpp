@@ -65,6 +65,7 @@ Ladder climb(const Subject& subject, const ExamineOptions& options, const Findin
   every_rung.correct_quiet_poses = true;  // the last rung is quiet, and is compared with those before
   std::unique_ptr<Findings> next;
   const Findings* found = &first;
+  Subject examined = subject;  // of `found`
   while (const Refit* refit = chosen_refit(*found)) {
     if (static_cast<int>(ladder.rungs.size()) > most) {
       ladder.stopped = "as many effects were added as are allowed";
@@ -75,14 +76,14 @@ Ladder climb(const Subject& subject, const ExamineOptions& options, const Findin
       return ladder;
     }
     const std::string added = refit->effect;
-    Subject with = subject;
+    Subject with = examined;
     with.model = refit->model;
     with.near = &refit->fit.fit.prediction.solution;
     try {
       std::unique_ptr<Findings> after = examine(with, every_rung);
       Rung rung = rung_of(*after, added);
       rung.refit_only = figures_of(*found, ladder.rungs.back().added);
-      rung.random_other = random_other(subject, *found, options.seed + static_cast<unsigned>(ladder.rungs.size()));
+      rung.random_other = random_other(examined, *found, options.seed + static_cast<unsigned>(ladder.rungs.size()));
       ladder.rungs.push_back(std::move(rung));
       ladder.last = after->diagnosis;
       ladder.model = after->model;
@@ -92,6 +93,7 @@ Ladder climb(const Subject& subject, const ExamineOptions& options, const Findin
       return ladder;
     }
     found = next.get();
+    examined.model = with.model, examined.near = nullptr;
   }
   ladder.stopped = verdict_name(found->diagnosis.verdict) + ": " + found->diagnosis.why;
   return ladder;

@@ -33,7 +33,9 @@ std::vector<Option> options_of(const Subject& subject) {
   };
   const Eigen::Vector3d& lateral = subject.fitted.anatomy->lateral;
   const std::string side = lateral.x() > 0 ? "left" : "right";
-  return {{subject.fitted.measurements[0]->pose.name + ", once more", down, true},
+  const bool several = subject.fitted.measurements.size() > 1;
+  const std::string again = several ? "all that was fitted" : subject.fitted.measurements[0]->pose.name;
+  return {{again + ", once more", down, true},
           {"tilted 45 degrees, head up", tilted(45, feet)},
           {"tilted 45 degrees to the patient's " + side, tilted(45, lateral)},
           {"upright", feet}};
@@ -86,15 +88,15 @@ class Pose {
   /// Noise of as many points per node as the fitted scan has, what the mesh does, and the scan's own place.
   void factorise() {
     const Eigen::Index n = place_.rows();
-    const double points = static_cast<double>(found_.base.fit.residuals.size()) / static_cast<double>(n);
+    const auto scans = found_.base.fit.prediction.poses.size();
+    const double points = static_cast<double>(found_.base.fit.residuals.size()) / static_cast<double>(scans * n);
     const double nugget = found_.sources.noise_mm.squaredNorm() / static_cast<double>(found_.sources.noise_mm.size()) /
                           std::max(1.0, points);
     const double shared = found_.sources.spread_mm * found_.sources.spread_mm;
     Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(n, n);
-    const Tolerances tolerances;
     for (const auto& row : simulation::find_effect("misregistration")->parameters()) {
       const Eigen::VectorXd mode =
-          tolerance_for("misregistration", row.unit, tolerances) * slope("misregistration." + row.name);
+          tolerance_for("misregistration", row.unit, found_.tolerances) * slope("misregistration." + row.name);
       sigma.noalias() += mode * mode.transpose();
     }
     for (Eigen::Index i = 0; i < n; ++i)

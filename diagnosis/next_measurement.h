@@ -23,7 +23,7 @@ struct Separation {
 /// the smaller of Δ_ij and Δ_ji, for effects at their fitted (else usual) size. A further pose is one forward solve of
 /// the base model and is assumed to be scanned as the fitted one was: every skin node a point, the same noise and
 /// spread. Best first.
-/// @param set  effects to be told apart; with fewer than two, of those not seen
+/// @param set  effects to be told apart; with fewer than two the separation is 0 and single_power orders the list
 std::vector<Separation> next_measurements(const Subject& subject, const Findings& found,
                                           const std::vector<std::string>& set);
 

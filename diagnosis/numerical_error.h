@@ -17,7 +17,8 @@ struct NumericalError {
   double spread_mm = 0;        ///< rms of finer_doubt × finer_mm and coarser_mm: what is left when finer_mm was added
   Eigen::VectorXd share;       ///< #R, of the spread at each point: what the places around it show; mean square 1
   double length_mm = 0;        ///< over which it is alike
-  /// Why a mesh gave no answer, or empty; where it gave none its column is zero and the other counts twice.
+  /// Why a mesh gave no answer, or empty; where it gave none its column is zero and the other counts twice in
+  /// the spread.
   std::string finer_failure, coarser_failure;
   /// Of linear elements: what finer_mm comes from, to start the next one from.
   simulation::Model model;

@@ -82,11 +82,19 @@ Eigen::VectorXd joined(const std::vector<Eigen::VectorXd>& parts) {
   return all;
 }
 
+/// Of each pose that has rows.
+void add_noise(const calibration::Residuals& residuals, const Eigen::VectorXd& noise_mm, std::vector<double>& poses) {
+  for (int pose = 0; residuals.size() > 0 && pose <= residuals.pose.maxCoeff(); ++pose) {
+    const auto own = (residuals.pose.array() == pose).cast<double>();
+    if (own.sum() > 0) poses.push_back(std::sqrt((own * noise_mm.array().square()).sum() / own.sum()));
+  }
+}
+
 /// Of the points of others.mask, all of scans that are not fitted: errors as in the fitted scan, each scan with its own
 /// place and breath, and what the fitted parameters are uncertain by.
-Whitening unfitted_whitening(calibration::Evaluator& evaluator, const FreeParameters& parameters,
-                             const WeightedFit& fit, const ErrorSources& sources, const Metric& metric,
-                             const Tolerances& tolerances, const Prediction& prediction, const OtherPoses& others) {
+void set_errors(calibration::Evaluator& evaluator, const FreeParameters& parameters, const WeightedFit& fit,
+                const ErrorSources& sources, const Metric& metric, const Tolerances& tolerances,
+                const Prediction& prediction, OtherPoses& others) {
   const Scene& whole = evaluator.scene();
   const simulation::Model model = parameters.model(fit.fit.u);
   std::vector<double> noise = metric.noise_mm;
@@ -114,7 +122,8 @@ Whitening unfitted_whitening(calibration::Evaluator& evaluator, const FreeParame
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
   const Eigen::MatrixXd shapes = slope * axes.eigenvectors() * axes.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
   for (Eigen::Index i = 0; i < shapes.cols(); ++i) errors.modes.push_back({"parameters", shapes.col(i)});
-  return Whitening::of(seen.residuals, errors);
+  others.whitening = std::make_shared<Whitening>(Whitening::of(seen.residuals, errors));
+  add_noise(seen.residuals, errors.noise_mm, others.noise_mm);
 }
 
 void weigh_unfitted(OtherPoses& others) {
@@ -163,15 +172,16 @@ OtherPoses other_poses_of_base(const Scene& whole, const FreeParameters& paramet
       if (others.failure.empty()) {
         others.unfitted = whole.measurements.size() - first;
         keep(fit, prediction, sources, others);
-        others.whitening = std::make_shared<Whitening>(
-            unfitted_whitening(evaluator, parameters, fit, sources, metric, tolerances, prediction, others));
+        set_errors(evaluator, parameters, fit, sources, metric, tolerances, prediction, others);
         weigh_unfitted(others);
       }
     } catch (const NumericalFailure& failure) {
       others = {};
       others.failure = failure.what();
     }
+  const std::size_t unfitted = others.distance_mm.size();
   add_left_out(parameters, fit, sources, others);
+  if (others.distance_mm.size() > unfitted) add_noise(fit.fit.residuals, sources.noise_mm, others.noise_mm);
   return others;
 }
 

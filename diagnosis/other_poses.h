@@ -17,6 +17,7 @@ struct OtherPoses {
   std::size_t unfitted = 0;                  ///< how many of the distances are of poses that are not fitted at all
   calibration::PointMask mask;               ///< their points, as the base model has them over its skin
   std::vector<Eigen::VectorXd> distance_mm;  ///< of those points; then of fitted poses left out
+  std::vector<double> noise_mm;              ///< of the scan of each; only of the base model
   /// ‖L⁻¹ d‖² of the poses that are not fitted: Σ = L Lᵀ holds all that their distances may be at a base model that
   /// lacks nothing (error_sources.h), and what its parameters are uncertain by.
   double objective = 0;

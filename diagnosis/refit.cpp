@@ -160,7 +160,7 @@ Refit summary(const RefitProblem& problem, Job& job) {
       rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, job.parameters->prior_information(),
                                           calibration::spatial_blocks(fit.residuals)));
   refit.parameters = linear_intervals(job.effect, job.fit, *job.parameters, *problem.metric);
-  refit.model = job.parameters->model(fit.u);
+  refit.model = job.parameters->model(fit.u), refit.given = job.model;
   if (job.finished) {
     const OtherPoses others =
         other_poses_of_refit(problem.whole, *job.parameters, job.fit, *problem.sources, *problem.others);

@@ -33,6 +33,7 @@ struct Refit {
   double pose_misfit = 1;                   ///< what is left of it, per point
   std::vector<FittedParameter> parameters;  ///< of the effect
   simulation::Model model;                  ///< with the fitted numbers
+  simulation::Model given;                  ///< as it began: where its priors stand
   WeightedFit fit;
 };
 

@@ -39,9 +39,10 @@ struct Projected {
 
 class Scorer {
  public:
-  Scorer(const Residuals& residuals, const Eigen::MatrixXd& slope, const std::vector<Candidate>& candidates,
-         const Whitening& whitening)
+  Scorer(const Residuals& residuals, const Eigen::VectorXd& mean_mm, const Eigen::MatrixXd& slope,
+         const std::vector<Candidate>& candidates, const Whitening& whitening)
       : residuals_(residuals),
+        mean_mm_(mean_mm),
         slope_(slope),
         candidates_(candidates),
         log_points_(std::log(whitening.effective_points())) {
@@ -49,7 +50,7 @@ class Scorer {
     const auto freed = [&absorbed](const Eigen::MatrixXd& a) -> Eigen::MatrixXd {
       return a - absorbed * (absorbed.transpose() * a);
     };
-    distance_ = freed(whitening.apply(residuals.distance_mm));
+    distance_ = freed(whitening.apply(residuals.distance_mm + mean_mm));
     for (const Candidate& candidate : candidates) {
       Projected p{freed(whitening.apply(candidate.slope)), {}, {}, 0, false};
       if (candidate.secant.size() > 0) {
@@ -81,6 +82,7 @@ class Scorer {
       score.beyond_range |= std::abs(score.step[k] - parameter.null) > implausible * std::abs(range - parameter.null);
     }
     score.wrong_sign = p.one_sided && score.step[0] < candidate.parameters[0].null;
+    score.beyond_range &= !score.wrong_sign;  // a one-sided range has no other side to leave
     score.slope_statistic = statistic_along_slope(p, distance_);
     score.statistic = std::max(score.slope_statistic, statistic_along_secant(p, distance_));
     score.bic = score.statistic - score.freedom * log_points_;
@@ -143,7 +145,7 @@ class Scorer {
     Eigen::MatrixXd both(slope_.rows(), slope_.cols() + candidate.slope.cols());
     both << slope_, candidate.slope;
     Eigen::VectorXd d = residuals_.distance_mm;
-    const Eigen::VectorXd step = -both.completeOrthogonalDecomposition().solve(d);
+    const Eigen::VectorXd step = -both.completeOrthogonalDecomposition().solve(d + mean_mm_);
     for (Eigen::Index k = 0; k < candidate.slope.cols(); ++k) {
       const CandidateParameter& parameter = candidate.parameters[static_cast<std::size_t>(k)];
       const double wanted = parameter.null + step[slope_.cols() + k];
@@ -165,6 +167,7 @@ class Scorer {
   }
 
   const Residuals& residuals_;
+  const Eigen::VectorXd& mean_mm_;
   const Eigen::MatrixXd& slope_;
   const std::vector<Candidate>& candidates_;
   double log_points_;
@@ -179,9 +182,9 @@ double power_of(const ScoreTable& table, int freedom, double noncentrality) {
   return chi_squared_power(freedom, noncentrality, table.chance_bic + freedom * std::log(table.effective_points));
 }
 
-ScoreTable score_candidates(const Residuals& residuals, const Eigen::MatrixXd& slope,
+ScoreTable score_candidates(const Residuals& residuals, const Eigen::VectorXd& mean_mm, const Eigen::MatrixXd& slope,
                             const std::vector<Candidate>& candidates, const Whitening& whitening, unsigned seed) {
-  const Scorer scorer(residuals, slope, candidates, whitening);
+  const Scorer scorer(residuals, mean_mm, slope, candidates, whitening);
   ScoreTable table;
   table.base_rms_mm = rms(residuals.distance_mm);
   table.base_held_out_rms_mm = scorer.held_out_rms(residuals.distance_mm, slope);

@@ -52,8 +52,11 @@ double power_of(const ScoreTable& table, int freedom, double noncentrality);
 /// A candidate with a secant is tested along both directions and counts with the better one.
 /// p: max over all candidates and directions of b under d̃ ~ N(0, I), 1000 seeded draws (Westfall and Young). It is as
 /// good as Σ: with white noise it calls every mesh error an effect.
-/// @param slope  ∂d/∂u of the fitted parameters, #R by #parameters
-ScoreTable score_candidates(const calibration::Residuals& residuals, const Eigen::MatrixXd& slope,
-                            const std::vector<Candidate>& candidates, const Whitening& whitening, unsigned seed);
+/// Predicted and base root mean squares are of the distances as they are, as those of refits.
+/// @param mean_mm  #R, added to the distances for the tests and the steps: what the mesh takes away
+/// @param slope    ∂d/∂u of the fitted parameters, #R by #parameters
+ScoreTable score_candidates(const calibration::Residuals& residuals, const Eigen::VectorXd& mean_mm,
+                            const Eigen::MatrixXd& slope, const std::vector<Candidate>& candidates,
+                            const Whitening& whitening, unsigned seed);
 
 }  // namespace supine::diagnosis

@@ -199,10 +199,19 @@ std::string pose_fall(const Findings& found, const Refit& refit) {
   return text + " mm";
 }
 
+/// The lowest of what is named.
+double p_of_named(const Findings& found) {
+  double p = 1;
+  for (const Score& score : found.table.scores)
+    for (const std::string& name : found.diagnosis.missing)
+      if (score.effect == name) p = std::min(p, score.p_value);
+  return p;
+}
+
 void say_verdict(const Run& run, const Findings& found) {
   const diagnosis::Diagnosis& d = found.diagnosis;
   const std::string names = fmt::format("{}", fmt::join(d.missing, " or "));
-  const double p = found.table.scores.empty() ? 1 : found.table.scores.front().p_value;
+  const double p = p_of_named(found);
   const Refit* best = d.missing.empty() ? nullptr : refit_of(found, d.missing[0]);
   switch (d.verdict) {
     case Verdict::nothing_missing:

@@ -13,17 +13,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
+void warn_of_missing_mesh(Run& run, const diagnosis::NumericalError& error) {
+  if (!error.finer_failure.empty())
+    run.warn("the distances are not corrected for the mesh: finer elements give no answer (" + error.finer_failure +
+             "); a coarser mesh alone says how far it may be wrong");
+  if (!error.coarser_failure.empty())
+    run.warn("the error of the mesh is known from finer elements alone; the coarser mesh gives no answer (" +
+             error.coarser_failure + ")");
+}
+
 class DiagnoseTool : public Tool {
  public:
   std::string name() const override { return "supine-diagnose"; }
 
   std::string summary() const override {
     return "Asks what a calibrated model lacks: where it is off, which effect of the catalogue would take that away, "
-           "how "
-           "sure that is, what this scan cannot show and what to measure next.\n"
+           "how sure that is, what this scan cannot show and what to measure next.\n"
            "Writes diagnosis.json, diagnosis.vtp (scan points with the shape of each effect) and error_map_POSE.vtp "
-           "(the "
-           "model's skin). -o names their folder (default: that of the mesh; with --ladder its subfolder ladder).\n\n"
+           "(the model's skin). -o names their folder (default: that of the mesh; with --ladder its subfolder "
+           "ladder).\n\n"
            "Examples:\n"
            "  supine-diagnose mycase mycase/out/mesh.vtu\n"
            "  supine-diagnose mycase mycase/out/mesh.vtu --model mycase/out/model.toml -o trial\n";
@@ -34,8 +42,10 @@ class DiagnoseTool : public Tool {
     app.add_option("mesh", mesh_file_, "imaged mesh, as supine-tetrahedralise writes it (.vtu)")->required();
     app.add_option("--model", model_file_,
                    "calibrated model (default: model.toml beside the mesh, as supine-calibrate writes it)");
-    app.add_option("--refit", options_.refits,
-                   "the first N candidates are added and fitted again; 0 = none, then nothing is named")
+    app.add_option(
+           "--refit", options_.refits,
+           "the N candidates with the largest T - 2q, of those within reach of the best, are added and fitted again; "
+           "0 = none, then nothing is named")
         ->check(CLI::Range(0, 100))
         ->capture_default_str();
     app.add_flag("--no-other-meshes", no_other_meshes_,
@@ -74,6 +84,8 @@ class DiagnoseTool : public Tool {
     auto found = diagnosis::examine(subject_of(*measured, measured->model, noise), options_);
     if (!found->numerical)
       run.warn("the error of the mesh is guessed from the residual (" + found->numerical_failure + ")");
+    else
+      warn_of_missing_mesh(run, *found->numerical);
     if (!found->others.failure.empty()) run.warn("scans that are not fitted judge nothing: " + found->others.failure);
     run.stage("next measurement");
     live.show("further measurements");

@@ -98,6 +98,18 @@ TEST(Decide, AnUnfittedPoseThatComesOutFurtherOffSpeaksForNothing) {
   EXPECT_EQ(without_equilibrium(30), Verdict::missing);
 }
 
+TEST(Decide, WhatAnotherScanHasAboveTheNoiseIsAboveItsOwn) {
+  BaseFigures base = with_unfitted_pose(real_left);
+  base.pose_rms_mm = {1.6};
+  const auto verdict_of = [&base] {
+    return decide(table_with(0.001), {seen_elsewhere(refit("ligament", 4, 1.8), -1, 1.55)}, {nothing_left}, base)
+        .verdict;
+  };
+  EXPECT_EQ(verdict_of(), Verdict::unexplained) << "8 % of what is above 0.7 mm";
+  base.pose_noise_mm = {1.5};
+  EXPECT_EQ(verdict_of(), Verdict::missing) << "half of what is above 1.5 mm";
+}
+
 TEST(Decide, DoesNotNameWhatTheHeldOutErrorDoesNotConfirm) {
   constexpr double p = 0.03;  // not low enough to name anything by itself
   const Diagnosis d = verdict({refit("ligament", 60, 1.39)}, nothing_left, p);

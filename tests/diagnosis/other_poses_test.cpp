@@ -69,6 +69,8 @@ TEST(OtherPoses, OfAModelThatLacksNothingErrorsAloneAreLeft) {
   ASSERT_EQ(base.unfitted, 1u);
   EXPECT_NEAR(base.misfit, 1, 0.3);
   EXPECT_NEAR(base.rms_mm().at(0), noise_mm, 0.05);
+  ASSERT_EQ(base.noise_mm.size(), 1u);
+  EXPECT_NEAR(base.noise_mm[0], noise_mm, 0.05);
 }
 
 TEST(OtherPoses, GainByWhatIsMissingAndLoseByWhatIsNot) {

@@ -24,6 +24,8 @@ Eigen::MatrixXd fitted_slopes(const Residuals& r) {
   return slope;
 }
 
+Eigen::VectorXd no_mean(const Residuals& r) { return Eigen::VectorXd::Zero(r.size()); }
+
 Candidate candidate(const std::string& name, const Eigen::MatrixXd& slope, bool one_sided = false) {
   Candidate c{name, {}, slope};
   for (Eigen::Index k = 0; k < slope.cols(); ++k)
@@ -55,7 +57,7 @@ double left_over(const Residuals& r, const Eigen::MatrixXd& columns) {
 TEST(ScoreTest, StatisticIsTheFallOfTheSumOfSquares) {
   const Residuals r = sheet(1);
   const auto candidates = catalogue_of(r);
-  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const ScoreTable table = score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1);
   for (const Candidate& c : candidates) {
     if (score_of(table, c.effect).wrong_sign) continue;
     Eigen::MatrixXd both(r.size(), 2 + c.slope.cols());
@@ -69,7 +71,7 @@ TEST(ScoreTest, FindsWhatIsThereWithItsSizeAndTheFallItPredicts) {
   Residuals r = sheet(2);
   const auto candidates = catalogue_of(r);
   r.distance_mm -= 0.6 * candidates[0].slope;  // the model lacks 0.6 of "wave": the scan lies where it would bring it
-  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const ScoreTable table = score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1);
   const Score& best = table.scores.front();
   EXPECT_EQ(best.effect, "wave");
   EXPECT_NEAR(best.step[0], 0.6, 4 * best.step_sd[0]);
@@ -83,21 +85,23 @@ TEST(ScoreTest, AOneSidedEffectOfTheWrongSignScoresNothing) {
   Residuals r = sheet(3);
   const auto candidates = catalogue_of(r);
   r.distance_mm += 0.6 * candidates[2].slope;
-  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const ScoreTable table = score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1);
   const Score& ring = score_of(table, "ring");
   EXPECT_TRUE(ring.wrong_sign);
   EXPECT_EQ(ring.statistic, 0);
   EXPECT_LT(ring.step[0], 0);
   r.distance_mm -= 1.2 * candidates[2].slope;
-  const ScoreTable right = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const ScoreTable right = score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1);
   EXPECT_EQ(right.scores.front().effect, "ring");
 }
 
 TEST(ScoreTest, WhatRecalibrationAbsorbsScoresNothing) {
   Residuals r = sheet(4);
   r.distance_mm += 3 * fitted_slopes(r).col(1);
-  const ScoreTable before = score_candidates(sheet(4), fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
-  const ScoreTable after = score_candidates(r, fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
+  const ScoreTable before =
+      score_candidates(sheet(4), no_mean(r), fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
+  const ScoreTable after =
+      score_candidates(r, no_mean(r), fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
   for (const Score& score : before.scores) EXPECT_NEAR(score.statistic, score_of(after, score.effect).statistic, 1e-7);
 }
 
@@ -106,7 +110,8 @@ TEST(ScoreTest, FalseAlarmsComeAtTheirRate) {
   constexpr int trials = 200;
   for (int trial = 0; trial < trials; ++trial) {
     const Residuals r = sheet(100 + static_cast<unsigned>(trial), 200);
-    const ScoreTable table = score_candidates(r, fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
+    const ScoreTable table =
+        score_candidates(r, no_mean(r), fitted_slopes(r), catalogue_of(r), Whitening::independent(r), 1);
     alarms += table.scores.front().p_value < 0.05;
   }
   EXPECT_GE(alarms, 1);   // 10 expected, binomial sd 3.1
@@ -117,7 +122,7 @@ TEST(ScoreTest, SameDirectionIsNotToldApart) {
   const Residuals r = sheet(5);
   auto candidates = catalogue_of(r);
   candidates.push_back(candidate("twin", candidates[0].slope + 0.1 * candidates[1].slope.col(0)));
-  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const ScoreTable table = score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1);
   EXPECT_EQ(score_of(table, "wave").not_told_apart_from, std::vector<std::string>{"twin"});
   EXPECT_TRUE(score_of(table, "ring").not_told_apart_from.empty());
 }
@@ -126,7 +131,7 @@ TEST(ScoreTest, AlikeIsTheCorrelationOfWhatRecalibrationLeaves) {
   const Residuals r = sheet(6);
   auto candidates = catalogue_of(r);
   candidates.push_back(candidate("tilted", candidates[0].slope + 5 * fitted_slopes(r).col(1)));
-  const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const ScoreTable table = score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1);
   EXPECT_EQ(table.effects, (std::vector<std::string>{"wave", "pair", "ring", "tilted"}));
   EXPECT_NEAR(table.alike(0, 3), 1, 1e-9) << "all that tilted has beside the wave is absorbed";
   const Eigen::MatrixXd& s = fitted_slopes(r);
@@ -162,7 +167,8 @@ TEST(ScoreTest, PowerIsTheShareOfScansThatScoreAboveChance) {
     const Eigen::VectorXd& wave = candidates[0].slope;
     candidates[0].secant = 3.6 * 0.5 / wave.norm() * wave;  // 0.5 mm of noise
     r.distance_mm += candidates[0].secant;
-    const ScoreTable table = score_candidates(r, fitted_slopes(r), candidates, Whitening::independent(r), 1);
+    const ScoreTable table =
+        score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1);
     found += score_of(table, "wave").p_value < 0.05;
     power += score_of(table, "wave").power / trials;
   }
@@ -196,6 +202,33 @@ TEST(Whitening, CorrelatedErrorsBecomeIndependent) {
   for (int i = 0; i < 300; ++i) by_point.row(i) = sigma.row(clusters.of_point[i]);
   const Eigen::MatrixXd half = whitening.apply(by_point);  // L⁻¹ Σ = Lᵀ
   EXPECT_LT((half.transpose() * half - sigma).norm(), 1e-9 * sigma.norm());
+}
+
+TEST(ScoreTest, WhatTheMeshTakesAwayIsTestedAndPredictedErrorsAreThoseOfTheDistancesAsTheyAre) {
+  const Residuals r = sheet(1);
+  const auto candidates = catalogue_of(r);
+  const Whitening whitening = Whitening::independent(r);
+  const Eigen::VectorXd mean = -candidates[0].slope.col(0);
+  Residuals moved = r;
+  moved.distance_mm += mean;
+  const ScoreTable table = score_candidates(r, mean, fitted_slopes(r), candidates, whitening, 1);
+  const ScoreTable of_moved = score_candidates(moved, no_mean(r), fitted_slopes(r), candidates, whitening, 1);
+  EXPECT_DOUBLE_EQ(score_of(table, "wave").statistic, score_of(of_moved, "wave").statistic);
+  EXPECT_DOUBLE_EQ(score_of(table, "wave").step[0], score_of(of_moved, "wave").step[0]);
+  const ScoreTable plain = score_candidates(r, no_mean(r), fitted_slopes(r), candidates, whitening, 1);
+  EXPECT_DOUBLE_EQ(table.base_rms_mm, plain.base_rms_mm);
+  // The step takes away what the mesh does, which the distances as they are do not have.
+  EXPECT_GT(score_of(table, "wave").predicted_rms_mm, 1.05 * plain.base_rms_mm);
+}
+
+TEST(ScoreTest, OfTheWrongSignIsNotCalledImplausiblyLargeAsWell) {
+  Residuals r = sheet(1);
+  const auto candidates = catalogue_of(r);
+  r.distance_mm += candidates[2].slope.col(0);  // as if there were less than none of it
+  const Score ring =
+      score_of(score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1), "ring");
+  EXPECT_TRUE(ring.wrong_sign);
+  EXPECT_FALSE(ring.beyond_range);
 }
 
 }  // namespace
