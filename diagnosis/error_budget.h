@@ -7,7 +7,8 @@ namespace supine::diagnosis {
 
 /// What the RMS of the residual is made of, mm; the squares add up to its square.
 ///
-/// Each source counts with what the fit of the free parameters leaves of it, tr(M Σ_source Mᵀ)/n. Where the known
+/// The modes of each source count with what the fit of the free parameters leaves of them, tr(M Σ_source Mᵀ)/n; noise,
+/// the mesh's mean and its spread in full. Segmentation and chest wall are under registration. Where the known
 /// sources alone would make more than is there, registration, numerical error and parameters (which are tolerances, not
 /// measurements) are shortened alike until the sum fits, then noise; else the rest is the model's.
 struct ErrorBudget {

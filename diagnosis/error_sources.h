@@ -14,7 +14,7 @@ namespace supine::diagnosis {
 /// How well things are known that no tissue effect should be blamed for.
 struct Tolerances {
   double registration_mm = 0.3;      ///< shift of the scan, 1 sigma in each direction
-  double registration_rad = 0.0036;  ///< turn of the scan: 0.3 mm at 80 mm
+  double registration_rad = 0.0036;  ///< turn of the scan: 0.3 mm at 83 mm
   double segmentation_mm = 0.3;      ///< offset of the imaged skin: a fifth of a 1.5 mm voxel
   double chest_wall_mm = 1;          ///< the muscle between two scans: breath, and where its border was drawn
   double incompressibility = 0.1;    ///< of the catalogue's a: ν itself is assumed
