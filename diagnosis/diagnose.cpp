@@ -79,16 +79,18 @@ bool is_borne_out(const Refit& refit, const BaseFigures& base, const VerdictRule
 }
 
 /// Whether the refit stands out from the model as it is (b = 0), and what was not fitted shows it: blocks of skin, or
-/// where its own p is proof enough, because blocks cannot show what lies under one of them alone, another pose.
+/// where its own p is proof enough, because blocks cannot show what lies under one of them alone, another pose. Blocks
+/// and another pose together are as good as such a p.
 bool counts(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
   if (!refit.finished || !is_borne_out(refit, base, rules)) return false;
-  if (refit.bic >= rules.bic && evidence(refit, base) >= rules.bic &&
-      (improves(refit.held_out_rms_mm, base, rules) || p_of_effect(table, refit.effect) <= rules.sure_p))
-    return true;
-  if (p_of_effect(table, refit.effect) > rules.sure_p || refit.bic < rules.pose_bic) return false;
-  const double unfitted_fall = fall(refit, base, 0, unfitted_judges(refit, base)).value_or(0);
-  return fall_of_left_out(refit, base).has_value() || unfitted_fall >= rules.weak_excess_share ||
-         evidence(refit, base) >= rules.bic;
+  const double p = p_of_effect(table, refit.effect);
+  const bool sure = p <= rules.sure_p, skin = improves(refit.held_out_rms_mm, base, rules);
+  const bool enough = evidence(refit, base) >= rules.bic;
+  if (refit.bic >= rules.bic && enough && (skin || sure)) return true;
+  if (refit.bic < rules.pose_bic) return false;
+  const bool pose = fall(refit, base, 0, unfitted_judges(refit, base)).value_or(0) >= rules.weak_excess_share;
+  if (sure) return fall_of_left_out(refit, base).has_value() || pose || enough;
+  return p < rules.p_value && skin && pose && enough;
 }
 
 bool comes_near(const Refit& refit, const Refit& best, double misfit, const BaseFigures& base,

@@ -98,6 +98,20 @@ TEST(Decide, AnUnfittedPoseThatComesOutFurtherOffSpeaksForNothing) {
   EXPECT_EQ(without_equilibrium(30), Verdict::missing);
 }
 
+TEST(Decide, SkinAndAnotherScanTogetherNameWhatStandsOutALittle) {
+  const BaseFigures base = with_unfitted_pose(nothing_left);
+  const auto with = [&base](double p, double bic, double gain, double held_out_mm, double pose_mm) {
+    const Refit r = seen_elsewhere(refit("ligament", bic, held_out_mm), gain, pose_mm);
+    return decide(table_with(p), {r}, {nothing_left}, base).verdict;
+  };
+  EXPECT_EQ(with(0.03, 4, 4, 1.2, 0.9), Verdict::missing);
+  EXPECT_EQ(with(0.06, 4, 4, 1.2, 0.9), Verdict::nothing_missing) << "p";
+  EXPECT_EQ(with(0.03, 1, 2, 1.2, 0.9), Verdict::nothing_missing) << "BIC";
+  EXPECT_EQ(with(0.03, 4, 1, 1.2, 0.9), Verdict::nothing_missing) << "evidence";
+  EXPECT_EQ(with(0.03, 4, 4, 1.39, 0.9), Verdict::nothing_missing) << "skin";
+  EXPECT_EQ(with(0.03, 4, 4, 1.2, 0.97), Verdict::nothing_missing) << "the other scan";
+}
+
 TEST(Decide, WhatAnotherScanHasAboveTheNoiseIsAboveItsOwn) {
   BaseFigures base = with_unfitted_pose(real_left);
   base.pose_rms_mm = {1.6};
