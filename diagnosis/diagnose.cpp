@@ -86,7 +86,7 @@ bool counts(const Refit& refit, const ScoreTable& table, const BaseFigures& base
   const double p = p_of_effect(table, refit.effect);
   const bool sure = p <= rules.sure_p, skin = improves(refit.held_out_rms_mm, base, rules);
   const bool enough = evidence(refit, base) >= rules.bic;
-  if (refit.bic >= rules.bic && enough && (skin || sure)) return true;
+  if (refit.bic >= rules.bic && enough && (skin || sure || say_of_unfitted(refit, base) >= rules.bic)) return true;
   if (refit.bic < rules.pose_bic) return false;
   const bool pose = fall(refit, base, 0, unfitted_judges(refit, base)).value_or(0) >= rules.weak_excess_share;
   if (sure) return fall_of_left_out(refit, base).has_value() || pose || enough;

@@ -62,13 +62,13 @@ struct Diagnosis {
 /// nothing_missing  no score that chance would not give (p), or nothing that lowers the held-out error
 /// missing          one refit counts and no other comes near. Its evidence is b plus what poses that were not fitted
 ///                  gain with it (Refit::pose_gain; at most twice b for it, nothing where they end further off, in
-///                  full against it). It counts where b and evidence are `bic` or more and the held-out error falls
-///                  or its own p is below sure_p, because blocks of skin predicted without themselves cannot show what
-///                  lies under one of them alone. With such a p b of pose_bic will do where the evidence is `bic`, or
-///                  such a pose, or one left out, loses weak_excess_share; with a p under p_value where the evidence
-///                  is `bic`, the held-out error falls and such a pose loses weak_excess_share. Where one speaks
-///                  against it (gain below −pose_bic) or has no equilibrium the evidence must be `strong_bic`; fitted
-///                  poses left out, where several are fitted, have to fall too
+///                  full against it). It counts where b and evidence are `bic` or more and the held-out error falls,
+///                  or those poses alone gain `bic`, or its own p is below sure_p, because blocks of skin predicted
+///                  without themselves cannot show what lies under one of them alone. With such a p b of pose_bic will
+///                  do where the evidence is `bic`, or such a pose, or one left out, loses weak_excess_share; with a p
+///                  under p_value where the evidence is `bic`, the held-out error falls and such a pose loses
+///                  weak_excess_share. Where one speaks against it (gain below −pose_bic) or has no equilibrium the
+///                  evidence must be `strong_bic`; fitted poses left out, where several are fitted, have to fall too
 /// ambiguous        others have evidence within `bic` of the best, measurement effects first
 /// unexplained      nothing counts, though the residual is real or the best b is at least `strong_bic`; or the best
 ///                  leaves much of a real residual, or some of it and most of what a pose that was not fitted has

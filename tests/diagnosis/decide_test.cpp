@@ -110,6 +110,8 @@ TEST(Decide, SkinAndAnotherScanTogetherNameWhatStandsOutALittle) {
   EXPECT_EQ(with(0.03, 4, 1, 1.2, 0.9), Verdict::nothing_missing) << "evidence";
   EXPECT_EQ(with(0.03, 4, 4, 1.39, 0.9), Verdict::nothing_missing) << "skin";
   EXPECT_EQ(with(0.03, 4, 4, 1.2, 0.97), Verdict::nothing_missing) << "the other scan";
+  EXPECT_EQ(with(0.03, 7, 7, 1.5, 0.97), Verdict::missing) << "each scan by itself, whatever blocks of skin show";
+  EXPECT_EQ(with(0.03, 7, 5, 1.5, 0.97), Verdict::nothing_missing);
 }
 
 TEST(Decide, WhatAnotherScanHasAboveTheNoiseIsAboveItsOwn) {
