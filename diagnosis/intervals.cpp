@@ -30,7 +30,7 @@ Errors errors_with(const calibration::Scene& scene, const ErrorSources& sources,
   Errors errors{without_tolerance_for(refit.effect, sources), {}};
   if (base != nullptr) {
     try {
-      set_numerical(measure_finer_again(scene, refit.model, refit.fit.fit, *base), tolerances, errors.sources);
+      set_numerical(measure_numerical_error(scene, refit.model, refit.fit.fit, base), tolerances, errors.sources);
     } catch (const NumericalFailure&) {
       // No other mesh carries this model: what was measured without the effect has to do.
     }

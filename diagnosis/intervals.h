@@ -7,7 +7,7 @@ namespace supine::diagnosis {
 
 /// Size and 95 % interval of an effect that is to be named: replaces Refit::parameters, nothing else.
 ///
-/// What finer elements change is measured again with the effect in the model: a mesh that is too stiff makes too little
+/// The mesh's error is measured again with the effect in the model, because a mesh that is too stiff makes too little
 /// of the effect as well, and the refit goes on from where it is under that error. The interval of a strength without a
 /// prior is a profile: the values at which F, everything else fitted again, is 3.84 · max(1, misfit) above its least;
 /// cut at the range. It need not lie evenly, and may be open to the end where ever more of the effect changes nothing.

@@ -208,15 +208,6 @@ NumericalError measure_numerical_error(const calibration::Scene& scene, const si
   return result;
 }
 
-NumericalError measure_finer_again(const calibration::Scene& scene, const simulation::Model& model,
-                                   const calibration::Fit& fit, const NumericalError& before) {
-  NumericalError result;
-  result.coarser_mm = before.coarser_mm, result.coarser_failure = before.coarser_failure;
-  measure_finer(scene, model, fit, &before, result);
-  summarise(scene, fit.residuals, result);
-  return result;
-}
-
 std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& whole, const NumericalError& fitted) {
   const std::size_t count = fitted.finer.poses.size();
   if (count == 0 || whole.measurements.size() == count) return {};

@@ -34,13 +34,6 @@ struct NumericalError {
 NumericalError measure_numerical_error(const calibration::Scene& scene, const simulation::Model& model,
                                        const calibration::Fit& fit, const NumericalError* near = nullptr);
 
-/// The same for a model of one effect more than that of @p before: finer elements anew, from there; coarser_mm, which
-/// counts as an error of that size and corrects nothing, as it was.
-/// @pre  the fit has the points that @p before was measured at
-/// @throws NumericalFailure  the finer mesh gave no answer
-NumericalError measure_finer_again(const calibration::Scene& scene, const simulation::Model& model,
-                                   const calibration::Fit& fit, const NumericalError& before);
-
 /// Change of distance that finer elements make for every scan point of the measurements that are not fitted, in the
 /// order of the scene; 0 where the point lies beyond the border. Empty for quadratic meshes, and where a pose does not
 /// come out in a few steps.

@@ -98,22 +98,6 @@ TEST(NumericalError, DoesNotDependOnWhereTheSolutionIsLookedForFrom) {
   EXPECT_LT(rms(alone.finer_mm - followed.finer_mm), 0.002);
 }
 
-TEST(NumericalError, OfOneEffectMoreTakesFinerElementsAnewAndKeepsTheOtherSurface) {
-  const LinearOfQuadratic f;
-  const NumericalError before = measure_numerical_error(f.scene, twin_truth(), f.fit);
-  simulation::Model stiffer = twin_truth();
-  stiffer.breast.young_modulus_kpa.value *= 1.3;
-  calibration::Evaluator evaluator(f.scene, stiffer);
-  calibration::Fit fit;
-  fit.prediction = evaluator.predict(stiffer, &f.fit.prediction.solution);
-  fit.residuals = calibration::residuals_of(f.scene, fit.prediction, f.fit.mask, {0.05});
-  const NumericalError again = measure_finer_again(f.scene, stiffer, fit, before);
-  const NumericalError alone = measure_numerical_error(f.scene, stiffer, fit);
-  EXPECT_LT(rms(again.finer_mm - alone.finer_mm), 0.002);
-  EXPECT_LT(rms(again.finer_mm - alone.finer_mm), 0.2 * rms(again.finer_mm - before.finer_mm)) << "the error differs";
-  EXPECT_EQ(again.coarser_mm, before.coarser_mm);
-}
-
 TEST(NumericalError, SaysWhyNeitherMeshGaveAnAnswer) {
   const Fitted f;
   meshing::TetMesh crossed = f.twin.mesh;  // its nipple pulled through its muscle: no surface to fill anew
