@@ -29,10 +29,10 @@ using Flat = Eigen::Map<Eigen::VectorXd>;
 /// Forcing term of an inexact Newton method that keeps quadratic convergence (Eisenstat and Walker 1996, choice 2),
 /// never finer than what the last digits need, or than what ends the solve at @p wanted_share.
 double linear_tolerance(double residual_share, double share_before, double wanted_share) {
-  constexpr double finest = 1e-6, coarsest = 1e-2, well_under = 0.3;
+  constexpr double finest = 1e-6, coarsest = 1e-2, well_under = 0.3, loosest = 0.1;
   const double ratio = residual_share / share_before;
   const double quadratic = std::clamp(0.1 * ratio * ratio, finest, coarsest);
-  return std::max(quadratic, std::min(well_under * wanted_share / residual_share, 10 * coarsest));
+  return std::max(quadratic, std::min(well_under * wanted_share / residual_share, loosest));
 }
 
 }  // namespace

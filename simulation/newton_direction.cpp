@@ -8,11 +8,11 @@ namespace supine::simulation {
 namespace {
 
 constexpr int max_gmres = 120;
-constexpr double shift_growth = 6;
 constexpr int max_conjugate_gradients = 200;
+constexpr double shift_growth = 6;        // from one try to the next
 constexpr double close_mm = 1;            // a kept factor is worth trying on a small mesh after steps shorter than this
 constexpr double usable_reduction = 0.5;  // a linear solve that got this far is still a direction
-constexpr double worth_reduction = 0.1;   // and this far with a kept factor saves a new one
+constexpr double worth_reduction = 0.1;   // and this far one that saves a new factor
 
 }  // namespace
 
@@ -61,8 +61,8 @@ double NewtonDirection::natural_mm(const Eigen::VectorXd& residual) {
 bool NewtonDirection::factorise(const State& state, double tolerance, Sums& sums, Eigen::VectorXd* step) {
   if (!factor_) factor_ = make_spd_solver(sums.tangent, mechanics_.mesh().points);
   // The exact tangent where it is positive definite; where it is not, the one without the skin's negative curvature;
-  // and if the tissue's is negative too, with a shift that makes it so and is not much
-  // larger than it has to be.
+  // and if the tissue's is negative too, with a shift not much larger than makes it so: tried from a little under the
+  // last one that did.
   double shift = 0;
   have_factor_ = true;
   for (int attempt = 0; attempt < 10; ++attempt) {

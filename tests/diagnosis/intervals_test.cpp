@@ -49,8 +49,9 @@ TEST(Intervals, OfAShapeThatTheScanSaysNothingOfIsItsPriorAsGiven) {
   ASSERT_NE(row, refit.parameters.end());
   EXPECT_NEAR(row->value, usual, 0.01 * usual);
   const double sd = parameters.priors()[static_cast<std::size_t>(width)]->sd;
-  EXPECT_GT(row->high, 0.99 * usual * std::exp(1.96 * sd));
-  EXPECT_LT(row->low, 1.01 * usual * std::exp(-1.96 * sd));
+  const double high = usual * std::exp(1.96 * sd), low = usual * std::exp(-1.96 * sd);
+  EXPECT_NEAR(row->high, high, 0.05 * high) << "widened a little: the catalogue's form is not the body's";
+  EXPECT_NEAR(row->low, low, 0.05 * low);
 }
 
 }  // namespace
