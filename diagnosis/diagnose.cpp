@@ -13,11 +13,16 @@
 namespace supine::diagnosis {
 namespace {
 
+/// Share of what skin left out has above the noise that the refit takes away, in squares.
+double fall_of_skin(double held_out_mm, const BaseFigures& base) {
+  const double noise = base.noise_mm * base.noise_mm, before = std::pow(base.held_out_rms_mm, 2);
+  return (before - std::pow(held_out_mm, 2)) / std::max(before - noise, 0.01 * noise);
+}
+
 bool improves(double held_out_mm, const BaseFigures& base, const VerdictRules& rules) {
   const double fall = base.held_out_rms_mm - held_out_mm;
   if (fall >= rules.held_out_mm && fall >= rules.held_out_share * base.held_out_rms_mm) return true;
-  const double noise = base.noise_mm * base.noise_mm, before = std::pow(base.held_out_rms_mm, 2) - noise;
-  return before > 0 && std::pow(held_out_mm, 2) - noise <= (1 - rules.excess_share) * before;
+  return base.held_out_rms_mm > base.noise_mm && fall_of_skin(held_out_mm, base) >= rules.excess_share;
 }
 
 double p_of_effect(const ScoreTable& table, const std::string& effect) {
@@ -53,6 +58,12 @@ std::optional<double> fall(const Refit& refit, const BaseFigures& base, std::siz
 
 std::optional<double> fall_of_left_out(const Refit& refit, const BaseFigures& base) {
   return fall(refit, base, base.unfitted_poses, base.pose_rms_mm.size());
+}
+
+/// The least of what skin left out and poses that were not fitted lose of what they have above the noise.
+double fall_of_unfitted(const Refit& refit, const BaseFigures& base) {
+  return std::min(fall_of_skin(refit.held_out_rms_mm, base),
+                  fall(refit, base, 0, unfitted_judges(refit, base)).value_or(1));
 }
 
 /// What poses that were not fitted say for or against it: their gain, and nothing for it where they are off by more
@@ -115,6 +126,41 @@ std::vector<const Refit*> best_and_rivals(const ScoreTable& table, const std::ve
   return good;
 }
 
+bool is_real(const LackOfFit& left, const VerdictRules& rules) {
+  return left.p_value < rules.lack_of_fit_p && left.misfit > rules.lack_of_fit_misfit;
+}
+
+/// No refit counts: nothing is missing, or it is none of these.
+Diagnosis nothing_counts(double p, const std::vector<Refit>& refits, const BaseFigures& base,
+                         const VerdictRules& rules) {
+  const Refit* most = nullptr;
+  for (const Refit& refit : refits)
+    if (refit.finished && (most == nullptr || evidence(refit, base) > evidence(*most, base))) most = &refit;
+  Diagnosis result;
+  result.left = base.left;
+  result.why = "no effect of the catalogue is borne out by what was not fitted";
+  if (most != nullptr && most->bic > rules.bic) result.why += fmt::format("; {} fits best (p {:.3f})", most->effect, p);
+  const bool strong = most != nullptr && most->bic >= rules.strong_bic;
+  if (!is_real(base.left, rules) && !(strong && p < rules.p_value)) return result;
+  result.verdict = Verdict::unexplained;
+  if (!refits.empty()) result.missing = {most != nullptr ? most->effect : refits.front().effect};
+  return result;
+}
+
+/// Why the best does not explain what is there; empty where it does.
+std::string what_speaks_against(const Refit& best, const LackOfFit& left, const BaseFigures& base,
+                                const VerdictRules& rules) {
+  const double taken = fall_of_unfitted(best, base);
+  const bool all_in_order = left.p_value >= rules.lack_of_fit_p || left.misfit < rules.slight_misfit;
+  const bool mostly_this = all_in_order || taken >= rules.excess_share;
+  if (mostly_this && !is_real(left, rules)) return {};
+  const std::string leaves = fmt::format(
+      "best of the catalogue, but it leaves {:.1f} times what errors would (p {:.2g})", left.misfit, left.p_value);
+  if (mostly_this) return leaves;
+  if (taken <= 0) return leaves + " and what was not fitted is further off with it";
+  return leaves + fmt::format(" and takes away {:.0f} % of what is above noise where it was not fitted", 100 * taken);
+}
+
 /// Polynomials in q up to degree 6, of the points of one pose each.
 Eigen::MatrixXd smooth_shapes(const calibration::Residuals& residuals) {
   constexpr int degree = 6;
@@ -171,47 +217,26 @@ LackOfFit lack_of_fit(const WeightedFit& fit, const Metric& metric) {
 
 Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, const std::vector<LackOfFit>& left,
                  const BaseFigures& base, const VerdictRules& rules) {
-  Diagnosis result;
-  result.left = base.left;
-  const auto real = [&rules](const LackOfFit& l) {
-    return l.p_value < rules.lack_of_fit_p && l.misfit > rules.lack_of_fit_misfit;
-  };
   const double p = p_of(table);
-  if (p >= rules.p_value && !real(base.left)) {
+  if (p >= rules.p_value && !is_real(base.left, rules)) {
+    Diagnosis result;
+    result.left = base.left;
     result.why =
         fmt::format("errors of scan, registration and mesh alone score as high as the best effect (p {:.3f})", p);
     return result;
   }
   const std::vector<const Refit*> good = best_and_rivals(table, refits, left, base, rules);
-  if (good.empty()) {
-    const Refit* most = nullptr;
-    for (const Refit& refit : refits)
-      if (refit.finished && (most == nullptr || evidence(refit, base) > evidence(*most, base))) most = &refit;
-    result.why = "no effect of the catalogue is borne out by what was not fitted";
-    if (most != nullptr && most->bic > rules.bic)
-      result.why += fmt::format("; {} fits best (p {:.3f})", most->effect, p);
-    const bool strong = most != nullptr && most->bic >= rules.strong_bic;
-    if (!real(base.left) && !(strong && p < rules.p_value)) return result;
-    result.verdict = Verdict::unexplained;
-    if (!refits.empty()) result.missing = {most != nullptr ? most->effect : refits.front().effect};
-    return result;
-  }
+  if (good.empty()) return nothing_counts(p, refits, base, rules);
   const Refit& best = *good.front();
+  Diagnosis result;
   result.left = left[static_cast<std::size_t>(&best - refits.data())];
-  for (const Refit* refit : good) result.missing.push_back(refit->effect);
-  const double taken = fall(best, base, 0, unfitted_judges(best, base)).value_or(1);
-  const bool elsewhere_too = taken >= rules.excess_share || result.left.p_value >= rules.lack_of_fit_p ||
-                             result.left.misfit < rules.slight_misfit;
-  if (real(result.left) || !elsewhere_too) {
+  result.why = what_speaks_against(best, result.left, base, rules);
+  if (!result.why.empty()) {
     result.verdict = Verdict::unexplained;
     result.missing = {best.effect};
-    result.why = fmt::format("best of the catalogue, but it leaves {:.1f} times what errors would (p {:.2g})",
-                             result.left.misfit, result.left.p_value);
-    if (!elsewhere_too)
-      result.why +=
-          fmt::format(" and takes away {:.0f} % of what scans that were not fitted have above noise", 100 * taken);
     return result;
   }
+  for (const Refit* refit : good) result.missing.push_back(refit->effect);
   std::stable_partition(result.missing.begin(), result.missing.end(), is_measurement_effect);
   result.verdict = result.missing.size() == 1 ? Verdict::missing : Verdict::ambiguous;
   result.why = result.verdict == Verdict::missing ? "no other effect comes near" : "these do equally well";

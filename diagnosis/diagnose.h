@@ -29,8 +29,8 @@ struct VerdictRules {
   double pose_excess_share = 0.05;  ///< a fitted pose left out must lose this share of its excess, in squares
   double weak_excess_share = 0.2;   ///< this where b is under `bic`
   double strong_bic = 20;           ///< evidence that something real is behind, whatever it is
-  double lack_of_fit_p = 0.01;      ///< what is left after the best is more than errors; a pose that was not fitted
-                                    ///< must then lose excess_share
+  double lack_of_fit_p = 0.01;      ///< what is left after the best is more than errors; skin left out and poses that
+                                    ///< were not fitted must then lose excess_share each
   double slight_misfit = 1.1;       ///< unless it is this small on the mean
   double lack_of_fit_misfit = 1.6;  ///< and this many times what errors would leave on the mean
 };
@@ -71,7 +71,8 @@ struct Diagnosis {
 ///                  evidence must be `strong_bic`; fitted poses left out, where several are fitted, have to fall too
 /// ambiguous        others have evidence within `bic` of the best, measurement effects first
 /// unexplained      nothing counts, though the residual is real or the best b is at least `strong_bic`; or the best
-///                  leaves much of a real residual, or some of it and most of what a pose that was not fitted has
+///                  leaves much of a real residual, or some of it and most of what skin left out, or a pose that was
+///                  not fitted, has above the noise
 /// @param refits  best first; of them only finished ones count
 /// @param left    lack of fit of each refit
 Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, const std::vector<LackOfFit>& left,

@@ -170,9 +170,33 @@ TEST(Decide, WhatLeavesAResidualHasToShowMoreInTheUnfittedPose) {
   const Diagnosis half = with_pose(0.95, {1.2, 1e-4});
   EXPECT_EQ(half.verdict, Verdict::unexplained);
   EXPECT_EQ(half.missing, Names{"ligament"});
-  EXPECT_NE(half.why.find("19 % of what scans that were not fitted have"), std::string::npos) << half.why;
+  EXPECT_NE(half.why.find("takes away 19 % of what is above noise"), std::string::npos) << half.why;
   base.unfitted_poses = 0;
   EXPECT_EQ(with_pose(0.95, {1.2, 1e-4}).verdict, Verdict::missing) << "fitted, left out in one linear step";
+}
+
+TEST(Decide, WhatLeavesAResidualHasToShowMoreInTheSkinLeftOut) {
+  const auto with_skin = [](double held_out_mm, const LackOfFit& after) {
+    return verdict({refit("ligament", 60, held_out_mm)}, after);
+  };
+  const LackOfFit some{1.3, 1e-4};  // of the 1.4 mm 1.47 mm² are above the noise
+  EXPECT_EQ(with_skin(1.2, some).verdict, Verdict::missing);
+  EXPECT_EQ(with_skin(1.3, {1.3, 0.4}).verdict, Verdict::missing) << "chance leaves as much";
+  EXPECT_EQ(with_skin(1.3, {1.05, 1e-4}).verdict, Verdict::missing) << "next to nothing is left";
+  EXPECT_EQ(with_skin(1.3, some).verdict, Verdict::unexplained);
+  const Diagnosis worse = with_skin(1.6, some);
+  EXPECT_EQ(worse.verdict, Verdict::unexplained);
+  EXPECT_EQ(worse.missing, Names{"ligament"});
+  EXPECT_NE(worse.why.find("what was not fitted is further off with it"), std::string::npos) << worse.why;
+}
+
+TEST(Decide, AnotherPoseDoesNotMakeUpForSkinThatDoesNotShowIt) {
+  const Refit r = seen_elsewhere(refit("ligament", 60, 1.6), 130, 0.8);
+  const auto with = [&r](const LackOfFit& after) {
+    return decide(table_with(0.001), {r}, {after}, with_unfitted_pose(real_left)).verdict;
+  };
+  EXPECT_EQ(with({1.3, 1e-4}), Verdict::unexplained);
+  EXPECT_EQ(with({1.05, 1e-4}), Verdict::missing);
 }
 
 TEST(Decide, BlocksOfSkinAreNotBelievedWhereAnotherPoseDoesNotShowIt) {
