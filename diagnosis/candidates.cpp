@@ -35,6 +35,7 @@ std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const 
     if (has(model, *effect) || (wanted && !wanted(effect->name()))) continue;
     Candidate candidate{effect->name(), {}, Eigen::MatrixXd(fit.residuals.size(), 0), {}};
     for (const Parameter& row : effect->parameters()) {
+      if (row.shape) continue;
       const std::string name = simulation::parameter_name(*effect, row);
       const Eigen::VectorXd slope =
           calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, name, sensitivities.of(name));

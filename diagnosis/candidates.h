@@ -28,7 +28,7 @@ struct Candidate {
 };
 
 /// Every effect of the catalogue that is not in the model and that the fitted points can feel. Parameters that change
-/// nothing at the null (the place of a ligament of no stiffness) are left out.
+/// nothing at the null are left out: place and shape (Parameter::shape), and what these points do not feel.
 /// @param unseen  out: effects of the catalogue that move no fitted point, here or anywhere
 /// @param wanted  which effects to look at; empty = all
 std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const simulation::Model& model,

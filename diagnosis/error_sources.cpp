@@ -46,7 +46,7 @@ void add_by_pose(const Residuals& residuals, const ErrorMode& mode, std::vector<
 double tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& t) {
   if (effect == "misregistration") return unit == "rad" ? t.registration_rad : t.registration_mm;
   if (effect == "segmentation_offset") return t.segmentation_mm;
-  if (effect == "chest_wall_motion") return t.chest_wall_mm;
+  if (effect == "chest_wall_motion") return unit == "1" ? 0 : t.chest_wall_mm;
   return effect == "incompressibility" ? t.incompressibility : 0;
 }
 

@@ -138,16 +138,21 @@ void settle_named(const Subject& subject, const ExamineOptions& options, Finding
       }
 }
 
+double beyond_freedom(const Score& score, double statistic) { return statistic - 2 * score.freedom; }
+
 }  // namespace
 
-std::vector<std::string> worth_refitting(const ScoreTable& table, std::size_t count) {
+std::vector<std::string> worth_refitting(const ScoreTable& table, const Tolerances& tolerances, std::size_t count) {
+  double best = 0;
+  for (const Score& score : table.scores) best = std::max(best, beyond_freedom(score, score.statistic));
   std::vector<std::pair<double, std::string>> ranked;
-  for (const Score& score : table.scores) ranked.emplace_back(score.statistic - 2 * score.freedom, score.effect);
+  for (const Score& score : table.scores)
+    if (beyond_freedom(score, score.statistic) > std::max(least_worth, worth_share * best))
+      ranked.emplace_back(beyond_freedom(score, statistic_without(score, tolerance_for(score.effect, {}, tolerances))),
+                          score.effect);
   std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<std::string> effects;
-  for (const auto& [statistic, effect] : ranked)
-    if (effects.size() < count && statistic > std::max(least_worth, worth_share * ranked.front().first))
-      effects.push_back(effect);
+  for (std::size_t i = 0; i < std::min(count, ranked.size()); ++i) effects.push_back(ranked[i].second);
   return effects;
 }
 
@@ -175,8 +180,9 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   const bool quiet = is_quiet(*found, options.rules);
   judge_by_other_poses(subject, options, !quiet || options.correct_quiet_poses, *found);
   if (!quiet && options.refits > 0)
-    found->refits = refit_candidates(problem, found->candidates, found->table,
-                                     worth_refitting(found->table, static_cast<std::size_t>(options.refits)));
+    found->refits =
+        refit_candidates(problem, found->candidates, found->table,
+                         worth_refitting(found->table, options.tolerances, static_cast<std::size_t>(options.refits)));
   for (const Refit& refit : found->refits)
     found->left.push_back(refit.solved ? lack_of_fit(refit.fit, found->metric) : LackOfFit{});
   found->budget = error_budget(found->base, found->sources, found->metric);

@@ -24,13 +24,6 @@ constexpr double tolerated_hopeless_share = 0.25;  // of an effect that errors m
 
 double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
 
-/// Strength is what changes the model at its typical size; an effect without such a row is all strength.
-bool is_strength(const simulation::Effect& effect, const Parameter& row) {
-  const auto& rows = effect.parameters();
-  const bool any = std::any_of(rows.begin(), rows.end(), [](const Parameter& r) { return r.median != r.null; });
-  return !any || row.median != row.null;
-}
-
 /// One candidate on its way. Each has an evaluator of its own, so that it does not matter which thread does what.
 struct Job {
   std::string effect;
@@ -86,10 +79,13 @@ Job prepared(const RefitProblem& problem, const Candidate& candidate, const Scor
   job.starts.push_back(start_at(*job.parameters, base, problem.base->fit.u, step));
   if (differ && candidate.parameters.size() == 1)
     job.starts.push_back(start_at(*job.parameters, base, problem.base->fit.u, usual));
-  // Without strength a place moves nothing, and at the wrong place strength only does harm: look on either side too.
+  // Without strength a place moves nothing, and at the wrong place a one-sided strength falls to nothing and stays
+  // there: look on either side too.
+  const bool falls = std::any_of(candidate.parameters.begin(), candidate.parameters.end(),
+                                 [](const CandidateParameter& p) { return p.one_sided; });
   for (const Parameter& row : simulation::find_effect(candidate.effect)->parameters()) {
-    const bool size = row.lower >= 0;  // no place
-    if (size || is_strength(*simulation::find_effect(candidate.effect), row)) continue;
+    const bool place = row.shape && row.lower < 0;
+    if (!falls || !place) continue;
     for (const double side : {-place_start_sd, place_start_sd}) {
       auto elsewhere = usual;
       elsewhere.emplace_back(candidate.effect + "." + row.name, row.median + side * row.log_sd);
@@ -195,9 +191,8 @@ simulation::EffectSetting free_setting(const std::string& name) {
   const simulation::Effect& effect = *simulation::find_effect(name);
   simulation::EffectSetting setting = simulation::null_setting(effect);
   for (const Parameter& row : effect.parameters()) {
-    const double spread = row.one_sided ? row.median * std::expm1(row.log_sd) : row.log_sd;
     setting.parameters[row.name] = {row.median, true, {}, row.lower, row.upper};
-    if (!is_strength(effect, row)) setting.parameters[row.name].prior_sd = spread;
+    if (row.shape) setting.parameters[row.name].prior_sd = simulation::prior_sd(row);
   }
   return setting;
 }

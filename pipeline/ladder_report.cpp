@@ -4,7 +4,6 @@
 #include <fmt/core.h>
 
 #include <fstream>
-#include <sstream>
 
 #include "calibration/free_parameters.h"
 #include "common/error.h"
@@ -43,32 +42,6 @@ std::map<std::string, double> fitted_values(const simulation::Model& model) {
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
     values[parameters.names()[static_cast<std::size_t>(i)]] = parameters.value(i, parameters.start()[i]);
   return values;
-}
-
-/// The block that supine-model would add, with place and shape free where the ladder fitted them.
-std::string fitted_block(const simulation::Effect& effect, const simulation::EffectSetting& setting) {
-  std::string block = effect_block(effect);
-  for (const auto& row : effect.parameters()) {
-    const simulation::Setting& s = setting.parameters.at(row.name);
-    const std::string plain = fmt::format("\n{} = {}  #", row.name, row.median);
-    const auto at = block.find(plain);
-    if (s.free && s.prior_sd && at != std::string::npos)
-      block.replace(at, plain.size(),
-                    fmt::format("\n{} = {{ value = {}, prior_sd = {:.3g}, lower = {}, upper = {} }}  #", row.name,
-                                row.median, *s.prior_sd, s.lower, s.upper));
-  }
-  return block;
-}
-
-std::string with_fitted_effect(const std::filesystem::path& file, const simulation::Model& model,
-                               const std::string& name) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  std::string all = text.str();
-  if (!all.empty() && all.back() != '\n') all += '\n';
-  for (const auto& setting : model.effects)
-    if (setting.name == name) all += fitted_block(*simulation::find_effect(name), setting);
-  return all;
 }
 
 void replace(const std::filesystem::path& file, const std::string& text) {
@@ -111,7 +84,7 @@ void write_rung_model(const diagnosis::Ladder& ladder, std::size_t rung, const s
                       const std::filesystem::path& file) {
   std::filesystem::copy_file(read_from, file, std::filesystem::copy_options::overwrite_existing);
   const simulation::Model& model = ladder.rungs[rung].model;
-  for (std::size_t r = 1; r <= rung; ++r) replace(file, with_fitted_effect(file, model, ladder.rungs[r].added));
+  for (std::size_t r = 1; r <= rung; ++r) replace(file, with_effect(file, ladder.rungs[r].added));
   replace(file, with_values(file, fitted_values(model)));
   read_model(file);
 }

@@ -4,7 +4,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <sstream>
 #include <string_view>
@@ -80,9 +79,8 @@ std::size_t block_end(const std::vector<std::string>& lines, std::size_t begin) 
 /// with another place than the file has would be another strength.
 std::string parameter_line(const Parameter& row) {
   const std::string comment = fmt::format("# {}{}", row.meaning, row.unit == "1" ? "" : ", " + row.unit);
-  const double prior_sd = row.one_sided ? row.median * std::expm1(row.log_sd) : row.log_sd;
   return fmt::format("{} = {{ value = {}, prior_sd = {:.3g}, lower = {}, upper = {} }}  {}\n", row.name, row.median,
-                     prior_sd, row.lower, row.upper, comment);
+                     simulation::prior_sd(row), row.lower, row.upper, comment);
 }
 
 /// The table that holds the section of a parameter: "breast" of the file, or the [[effect]] of that name.

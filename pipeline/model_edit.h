@@ -9,8 +9,8 @@
 
 namespace supine::pipeline {
 
-/// The [[effect]] block that stands for @p effect in a model.toml: its strength free, from the catalogue's median
-/// with the catalogue's spread and bounds; its place and shape fixed; units and meanings as comments.
+/// The [[effect]] block that stands for @p effect in a model.toml: everything free, from the catalogue's median
+/// with the catalogue's spread and bounds; units and meanings as comments.
 std::string effect_block(const simulation::Effect& effect);
 
 /// The text of a model.toml with the effect added at the end; everything else, comments too, stays byte for byte.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <cmath>
 #include <string>
 
 namespace supine::simulation {
@@ -19,6 +20,12 @@ struct Parameter {
   double log_sd = 0;
   bool one_sided = false;  ///< only values above null make sense
   std::string meaning;     ///< one line for help and messages
+  bool shape = false;      ///< where an effect acts or how wide, not how much: moves nothing while that is null
 };
+
+/// Standard deviation of the prior in the parameter's own unit, as Setting::prior_sd has it.
+inline double prior_sd(const Parameter& row) {
+  return row.one_sided ? row.median * std::expm1(row.log_sd) : row.log_sd;
+}
 
 }  // namespace supine::simulation

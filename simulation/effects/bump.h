@@ -7,9 +7,12 @@ namespace supine::simulation {
 
 /// A smooth hill over anatomy coordinates: (1 - r²)³ with r = |q - centre|/radius, 0 from r = 1 on. Twice continuously
 /// differentiable, 1 in the middle.
-inline double bump(const Eigen::Vector2d& q, const Eigen::Vector2d& centre, double radius) {
-  const double rest = 1 - (q - centre).squaredNorm() / (radius * radius);
-  return rest > 0 ? rest * rest * rest : 0;
+/// @param T  double, or a dual number for the derivatives with respect to place and radius
+template <class T>
+T bump(const Eigen::Vector2d& q, const T& centre_x, const T& centre_y, const T& radius) {
+  const T x = q.x() - centre_x, y = q.y() - centre_y;
+  const T rest = 1.0 - (x * x + y * y) / (radius * radius);
+  return rest > T(0.0) ? rest * rest * rest : T(0.0);
 }
 
 }  // namespace supine::simulation

@@ -8,7 +8,10 @@ namespace supine::simulation {
 
 const std::vector<Parameter>& ChestWallMotion::parameters() const {
   static const std::vector<Parameter> rows = {
-      {"amplitude_mm", "mm", 0, -15, 15, 0, 5, false, "how far the muscle has come out at the foot's centre"}};
+      {"amplitude_mm", "mm", 0, -15, 15, 0, 5, false, "how far the muscle has come out in the middle of the hill"},
+      {"centre_lateral", "1", 0, -0.6, 0.6, 0, 0.15, false, "the hill's middle from the foot's, in foot radii", true},
+      {"centre_head", "1", 0, -0.6, 0.6, 0, 0.15, false, "the same toward the head", true},
+      {"radius", "1", 1, 0.5, 1.6, 1, 0.15, false, "where the hill ends, in foot radii", true}};
   return rows;
 }
 
@@ -17,7 +20,7 @@ void ChestWallMotion::apply(const Scene& scene, std::span<const Dual> values, co
   if (scene.pose == "prone") return;
   const Table& q = scene.layout.interface.q;
   for (Eigen::Index p = 0; p < q.rows(); ++p)
-    fields.muscle_offset[p] += values[0] * bump(q.row(p).transpose(), Eigen::Vector2d::Zero(), 1.0);
+    fields.muscle_offset[p] += values[0] * bump(q.row(p).transpose(), values[1], values[2], values[3]);
 }
 
 }  // namespace supine::simulation

@@ -46,11 +46,11 @@ double rigid_stiffness(const Scene& scene, const Eigen::VectorXd& weight) {
 }  // namespace
 
 const std::vector<Parameter>& Ligament::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"stiffness_kpa_per_mm", "kPa/mm", 0, 0, 4, 0.4, 1.0, true,
-       "tangential and normal stiffness per area of the ring"},
-      {"offset_mm", "mm", 0, -30, 30, 0, 4, false, "distance of the ring's middle from the foot, outward positive"},
-      {"width_mm", "mm", 12, 1, 60, 12, 4, false, "width of the ring"}};
+  static const std::vector<Parameter> rows = {{"stiffness_kpa_per_mm", "kPa/mm", 0, 0, 4, 0.4, 1.0, true,
+                                               "tangential and normal stiffness per area of the ring"},
+                                              {"offset_mm", "mm", 0, -30, 30, 0, 4, false,
+                                               "distance of the ring's middle from the foot, outward positive", true},
+                                              {"width_mm", "mm", 12, 1, 60, 12, 4, false, "width of the ring", true}};
   return rows;
 }
 

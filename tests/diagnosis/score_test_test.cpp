@@ -8,6 +8,7 @@
 
 #include "common/error.h"
 #include "diagnosis/chi_squared.h"
+#include "diagnosis/examine.h"
 #include "tests/diagnosis/sheet.h"
 
 namespace supine::diagnosis {
@@ -229,6 +230,45 @@ TEST(ScoreTest, OfTheWrongSignIsNotCalledImplausiblyLargeAsWell) {
       score_of(score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1), "ring");
   EXPECT_TRUE(ring.wrong_sign);
   EXPECT_FALSE(ring.beyond_range);
+}
+
+TEST(ScoreTest, AScoreWithoutItsOwnToleranceIsThatUnderErrorsWithoutIt) {
+  Residuals r = sheet(1);
+  const auto candidates = catalogue_of(r);
+  const Eigen::VectorXd shape = candidates[2].slope.col(0);
+  r.distance_mm -= shape;
+  constexpr double tolerance = 0.4;
+  ErrorSources sources;
+  sources.noise_mm = r.sigma_mm, sources.mean_mm = no_mean(r);
+  sources.spread_mm = 0.2, sources.share = Eigen::VectorXd::Ones(r.size()), sources.length_mm = 15;
+  const auto score_under = [&](const ErrorSources& errors) {
+    return score_of(score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::of(r, errors), 1), "ring");
+  };
+  const Score without = score_under(sources);
+  sources.modes.push_back({"chest_wall", tolerance * shape});
+  const Score with = score_under(sources);
+  EXPECT_LT(with.statistic, 0.5 * without.statistic);
+  EXPECT_NEAR(statistic_without(with, tolerance), without.statistic, 1e-6 * without.statistic);
+  EXPECT_DOUBLE_EQ(statistic_without(with, 0), with.statistic);
+}
+
+Score scored(const std::string& effect, double step, double sd) {
+  Score score{};
+  score.effect = effect, score.freedom = 1;
+  score.step = Eigen::VectorXd::Constant(1, step), score.step_sd = Eigen::VectorXd::Constant(1, sd);
+  score.statistic = score.slope_statistic = step * step / (sd * sd);
+  return score;
+}
+
+TEST(WorthRefitting, WhatIsHiddenByItsOwnToleranceComesFirst) {
+  ScoreTable table{};
+  table.scores = {scored("gravity_tilt", 0.8, 0.1), scored("friction", 0.7, 0.1),
+                  scored("chest_wall_motion", 3.1, 1.04)};  // T 64, 49, 9; the last 118 without 1 mm of tolerance
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(worth_refitting(table, {}, 2), (Names{"chest_wall_motion", "gravity_tilt"}));
+  EXPECT_EQ(worth_refitting(table, {}, 6), (Names{"chest_wall_motion", "gravity_tilt", "friction"}));
+  table.scores.back() = scored("chest_wall_motion", 2, 1.04);
+  EXPECT_EQ(worth_refitting(table, {}, 6), (Names{"gravity_tilt", "friction"})) << "errors of the usual size";
 }
 
 }  // namespace

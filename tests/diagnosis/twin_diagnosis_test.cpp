@@ -143,6 +143,27 @@ TEST(TwinDiagnosis, ALigamentIsAmongWhatIsNamedAndAnotherScanBearsItOut) {
     }
 }
 
+TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
+  simulation::Model truth = with("chest_wall_motion", "amplitude_mm", 6);
+  truth.effects[0].parameters.at("centre_lateral").value = 0.35;
+  const Twin twin({truth, noise_mm});
+  const auto found = findings_of(twin, 3);
+  ASSERT_TRUE(names(found->diagnosis, "chest_wall_motion")) << found->diagnosis.why;
+  for (const Refit& refit : found->refits)
+    if (refit.effect == "chest_wall_motion")
+      for (const FittedParameter& p : refit.parameters) {
+        if (p.name == "chest_wall_motion.centre_lateral") {
+          EXPECT_GT(p.low, 0.05);
+          EXPECT_LT(p.low, 0.35);
+          EXPECT_GT(p.high, 0.35);
+        }
+        if (p.name == "chest_wall_motion.amplitude_mm") {
+          EXPECT_LT(p.low, 6);
+          EXPECT_GT(p.high, 6);
+        }
+      }
+}
+
 TEST(TwinDiagnosis, TheMapOfMissingForcesShowsATractionAndStaysBelowItsThresholdWithoutOne) {
   const auto map_of = [](const Twin& twin, const Findings& found) {
     return force_map(twin.scene(), found.model, found.base, found.metric, 1, 40);

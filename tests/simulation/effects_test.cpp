@@ -82,6 +82,36 @@ TEST(ArmTraction, PullsOnTheUpperOuterSkinInEveryPoseButProne) {
   EXPECT_LE(largest, 1);
 }
 
+TEST(ArmTraction, TheMiddleOfThePatchIsWhereTheModelSays) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  Model model = testing::soft_model();
+  model.effects = {effect("arm_traction", {{"head_kpa", 0.2}, {"centre_lateral", 0.9}, {"radius", 0.3}})};
+  const Eigen::VectorXd traction =
+      values_of(make_fields(model, {scene.mesh, scene.anatomy, layout, "supine"}, {0, 1, 0})).skin_traction;
+  double felt = 0;
+  for (Eigen::Index f = 0; f < layout.skin.faces.size(); ++f) {
+    const double r = (layout.skin.q.row(f) - Eigen::RowVector2d(0.9, 0.65)).norm() / 0.3;
+    EXPECT_NEAR(traction.segment<3>(3 * f).norm(), r < 1 ? 0.2 * std::pow(1 - r * r, 3) : 0, 1e-12);
+    felt += r < 1;
+  }
+  EXPECT_GT(felt, 0);
+}
+
+TEST(ChestWallMotion, TheHillStandsAndEndsWhereTheModelSays) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  Model model = testing::soft_model();
+  model.effects = {effect("chest_wall_motion", {{"amplitude_mm", 4}, {"centre_head", -0.4}, {"radius", 0.7}})};
+  const Eigen::VectorXd offset =
+      values_of(make_fields(model, {scene.mesh, scene.anatomy, layout, "supine"}, {0, 1, 0})).muscle_offset;
+  for (Eigen::Index p = 0; p < layout.interface.q.rows(); ++p) {
+    const double r = (layout.interface.q.row(p) - Eigen::RowVector2d(0, -0.4)).norm() / 0.7;
+    EXPECT_NEAR(offset[p], r < 1 ? 4 * std::pow(1 - r * r, 3) : 0, 1e-12);
+  }
+  EXPECT_GT(offset.maxCoeff(), 3);
+}
+
 TEST(ChestWallMotion, MovesTheInnerSurfaceOutButNotInProne) {
   const testing::TestScene& scene = testing::dome_scene();
   const std::vector<PoseLoad> poses = {{"prone", -Eigen::Vector3d::UnitY()}, {"supine", Eigen::Vector3d::UnitY()}};
