@@ -44,7 +44,8 @@ class DiagnoseTool : public Tool {
                    "calibrated model (default: model.toml beside the mesh, as supine-calibrate writes it)");
     app.add_option(
            "--refit", options_.refits,
-           "the N candidates with the largest T - 2q, of those within reach of the best, are added and fitted again; "
+           "the N candidates with the largest T - 2q without the tolerance for the effect itself, of those within "
+           "reach of the best, are added and fitted again; "
            "0 = none, then nothing is named")
         ->check(CLI::Range(0, 100))
         ->capture_default_str();
