@@ -4,14 +4,14 @@
 #include <Eigen/Dense>
 #include <cmath>
 
+#include "common/rms.h"
+
 namespace supine::calibration {
 namespace {
 
 constexpr double told_apart = 0.95;
 constexpr double open_sd = 1e3;
 constexpr double quantile = 1.959964;
-
-double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
 
 /// Information with a little added where there is none: along such a direction the variance becomes open_sd².
 struct Closed {

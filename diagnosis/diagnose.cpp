@@ -60,10 +60,17 @@ std::optional<double> fall_of_left_out(const Refit& refit, const BaseFigures& ba
   return fall(refit, base, base.unfitted_poses, base.pose_rms_mm.size());
 }
 
-/// The least of what skin left out and poses that were not fitted lose of what they have above the noise.
-double fall_of_unfitted(const Refit& refit, const BaseFigures& base) {
-  return std::min(fall_of_skin(refit.held_out_rms_mm, base),
-                  fall(refit, base, 0, unfitted_judges(refit, base)).value_or(1));
+/// The least of what skin left out and poses that were not fitted lose of what they have above the noise, and which.
+struct LeastFall {
+  double share;
+  std::string where;
+};
+
+LeastFall least_fall(const Refit& refit, const BaseFigures& base) {
+  const double skin = fall_of_skin(refit.held_out_rms_mm, base);
+  const double poses = fall(refit, base, 0, unfitted_judges(refit, base)).value_or(1);
+  if (poses < skin) return {poses, "scans that were not fitted"};
+  return {skin, "blocks of skin left out"};
 }
 
 /// What poses that were not fitted say for or against it: their gain, and nothing for it where they are off by more
@@ -150,15 +157,16 @@ Diagnosis nothing_counts(double p, const std::vector<Refit>& refits, const BaseF
 /// Why the best does not explain what is there; empty where it does.
 std::string what_speaks_against(const Refit& best, const LackOfFit& left, const BaseFigures& base,
                                 const VerdictRules& rules) {
-  const double taken = fall_of_unfitted(best, base);
+  const LeastFall taken = least_fall(best, base);
   const bool all_in_order = left.p_value >= rules.lack_of_fit_p || left.misfit < rules.slight_misfit;
-  const bool mostly_this = all_in_order || taken >= rules.excess_share;
+  const bool mostly_this = all_in_order || taken.share >= rules.excess_share;
   if (mostly_this && !is_real(left, rules)) return {};
   const std::string leaves = fmt::format(
       "best of the catalogue, but it leaves {:.1f} times what errors would (p {:.2g})", left.misfit, left.p_value);
   if (mostly_this) return leaves;
-  if (taken <= 0) return leaves + " and what was not fitted is further off with it";
-  return leaves + fmt::format(" and takes away {:.0f} % of what is above noise where it was not fitted", 100 * taken);
+  if (taken.share <= 0) return leaves + " and does not bring " + taken.where + " nearer";
+  return leaves +
+         fmt::format(" and takes away {:.0f} % of what {} have above the noise", 100 * taken.share, taken.where);
 }
 
 /// Polynomials in q up to degree 6, of the points of one pose each.

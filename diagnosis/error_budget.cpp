@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/rms.h"
+
 namespace supine::diagnosis {
 namespace {
-
-double mean_square(const Eigen::VectorXd& x) { return x.squaredNorm() / static_cast<double>(x.size()); }
 
 /// What the fit under all errors leaves of a field.
 class LeftByFit {

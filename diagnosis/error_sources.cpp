@@ -2,6 +2,7 @@
 #include "diagnosis/error_sources.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "calibration/noise.h"
 
@@ -34,6 +35,8 @@ std::string source_of(const std::string& effect) {
   return {};
 }
 
+bool is_of_each_scan(const std::string& source) { return source == "registration" || source == "chest_wall"; }
+
 /// The shape in each pose by itself: scans lie elsewhere, and breath stands elsewhere, in their own ways.
 void add_by_pose(const Residuals& residuals, const ErrorMode& mode, std::vector<ErrorMode>& modes) {
   for (int pose = 0; pose <= residuals.pose.maxCoeff(); ++pose)
@@ -48,6 +51,12 @@ double tolerance_for(const std::string& effect, const std::string& unit, const T
   if (effect == "segmentation_offset") return t.segmentation_mm;
   if (effect == "chest_wall_motion") return unit == "1" ? 0 : t.chest_wall_mm;
   return effect == "incompressibility" ? t.incompressibility : 0;
+}
+
+double shared_tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& tolerances,
+                            std::size_t poses) {
+  const double each = tolerance_for(effect, unit, tolerances);
+  return is_of_each_scan(source_of(effect)) ? each / std::sqrt(static_cast<double>(poses)) : each;
 }
 
 bool errors_imitate(const std::string& effect) { return tolerance_for(effect, {}, Tolerances{}) > 0; }
@@ -79,14 +88,13 @@ ErrorSources error_sources(const Residuals& residuals, const std::vector<Candida
   sources.length_mm = fallback.length_mm;
   for (const Candidate& candidate : candidates) {
     const std::string source = source_of(candidate.effect);
-    const bool of_one_image = source == "segmentation" || source == "numerical";
     for (std::size_t k = 0; !source.empty() && k < candidate.parameters.size(); ++k) {
       const ErrorMode mode{source, tolerance_for(candidate.effect, candidate.parameters[k].unit, tolerances) *
                                        candidate.slope.col(static_cast<Eigen::Index>(k))};
-      if (of_one_image)
-        sources.modes.push_back(mode);
-      else
+      if (is_of_each_scan(source))
         add_by_pose(residuals, mode, sources.modes);
+      else
+        sources.modes.push_back(mode);
     }
   }
   if (numerical != nullptr) set_numerical(*numerical, tolerances, sources);

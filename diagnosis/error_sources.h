@@ -48,6 +48,11 @@ struct ErrorSources {
   Eigen::VectorXd share;                ///< #R, of the spread at each point; mean square 1; empty = 1 everywhere
 };
 
+/// The same as it counts for a value that @p poses fitted scans have in common: what each scan errs by itself (its
+/// place, the breath it was taken at) averages out.
+double shared_tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& tolerances,
+                            std::size_t poses);
+
 /// Puts what the mesh does into the sources: mean, modes (one per other mesh), spread.
 void set_numerical(const NumericalError& numerical, const Tolerances& tolerances, ErrorSources& sources);
 

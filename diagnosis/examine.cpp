@@ -7,8 +7,10 @@
 #include "calibration/held_out.h"
 #include "calibration/uncertainty.h"
 #include "common/error.h"
+#include "common/rms.h"
 #include "diagnosis/intervals.h"
 #include "diagnosis/secants.h"
+#include "simulation/parameters.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -18,8 +20,6 @@ using calibration::FreeParameters;
 constexpr double far_from_given = 0.7;  // a factor of 2
 constexpr double least_worth = 3;
 constexpr double worth_share = 0.05;  // of the best score: what is further behind is not refitted
-
-double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
 
 void tell(const ExamineOptions& options, const std::string& what) {
   if (options.progress) options.progress(what);
@@ -69,8 +69,11 @@ void fit_from(const Subject& subject, calibration::Evaluator& evaluator, const F
 /// How far a modulus is from the one given, in its logarithm.
 double farthest_modulus(const FreeParameters& parameters, const Eigen::VectorXd& u) {
   double farthest = 0;
+  const auto is_shape = [&parameters](Eigen::Index i) {
+    return simulation::find_parameter(parameters.names()[static_cast<std::size_t>(i)])->shape;
+  };
   for (Eigen::Index i = 0; i < u.size(); ++i)
-    if (parameters.is_log(i)) farthest = std::max(farthest, std::abs(u[i] - parameters.start()[i]));
+    if (parameters.is_log(i) && !is_shape(i)) farthest = std::max(farthest, std::abs(u[i] - parameters.start()[i]));
   return farthest;
 }
 
@@ -142,14 +145,16 @@ double beyond_freedom(const Score& score, double statistic) { return statistic -
 
 }  // namespace
 
-std::vector<std::string> worth_refitting(const ScoreTable& table, const Tolerances& tolerances, std::size_t count) {
+std::vector<std::string> worth_refitting(const ScoreTable& table, const Tolerances& tolerances, std::size_t poses,
+                                         std::size_t count) {
   double best = 0;
   for (const Score& score : table.scores) best = std::max(best, beyond_freedom(score, score.statistic));
   std::vector<std::pair<double, std::string>> ranked;
   for (const Score& score : table.scores)
     if (beyond_freedom(score, score.statistic) > std::max(least_worth, worth_share * best))
-      ranked.emplace_back(beyond_freedom(score, statistic_without(score, tolerance_for(score.effect, {}, tolerances))),
-                          score.effect);
+      ranked.emplace_back(
+          beyond_freedom(score, statistic_without(score, shared_tolerance_for(score.effect, {}, tolerances, poses))),
+          score.effect);
   std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<std::string> effects;
   for (std::size_t i = 0; i < std::min(count, ranked.size()); ++i) effects.push_back(ranked[i].second);
@@ -182,7 +187,8 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   if (!quiet && options.refits > 0)
     found->refits =
         refit_candidates(problem, found->candidates, found->table,
-                         worth_refitting(found->table, options.tolerances, static_cast<std::size_t>(options.refits)));
+                         worth_refitting(found->table, options.tolerances, subject.fitted.measurements.size(),
+                                         static_cast<std::size_t>(options.refits)));
   for (const Refit& refit : found->refits)
     found->left.push_back(refit.solved ? lack_of_fit(refit.fit, found->metric) : LackOfFit{});
   found->budget = error_budget(found->base, found->sources, found->metric);

@@ -70,8 +70,10 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
 RefitProblem refit_problem(const Subject& subject, const Findings& found,
                            const std::function<void(const std::string&)>& progress);
 
-/// Effects worth a refit: of those whose T is within reach of the best, the @p count with the largest T without the
-/// tolerance for the effect itself.
-std::vector<std::string> worth_refitting(const ScoreTable& table, const Tolerances& tolerances, std::size_t count);
+/// Effects worth a refit: of those whose T − 2q is within reach of the best, the @p count with the largest T − 2q
+/// without the tolerance for the effect itself.
+/// @param poses  that are fitted
+std::vector<std::string> worth_refitting(const ScoreTable& table, const Tolerances& tolerances, std::size_t poses,
+                                         std::size_t count);
 
 }  // namespace supine::diagnosis

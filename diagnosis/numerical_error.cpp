@@ -7,6 +7,7 @@
 
 #include "calibration/error_model.h"
 #include "common/error.h"
+#include "common/rms.h"
 #include "diagnosis/other_mesh.h"
 #include "diagnosis/weighted_fit.h"
 #include "meshing/topology.h"
@@ -19,8 +20,6 @@ using calibration::Residuals;
 constexpr double order_doubt = 0.3;     // of the change that quadratic elements make
 constexpr double edge_share = 0.5;      // of the finer mesh's edges where skin and cut face meet
 constexpr double triangle_share = 0.8;  // of the coarser surface
-
-double mean_square(const Eigen::VectorXd& x) { return x.squaredNorm() / static_cast<double>(x.size()); }
 
 /// A field on the corners of linear tetrahedra as one on the nodes of quadratic ones of the same shapes.
 Points on_quadratic(const meshing::TetMesh& quadratic, const Points& corners) {

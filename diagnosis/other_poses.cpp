@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "common/rms.h"
 #include "diagnosis/candidates.h"
 #include "diagnosis/left_out_pose.h"
 
@@ -15,8 +16,6 @@ namespace {
 using calibration::FreeParameters;
 using calibration::Prediction;
 using calibration::Scene;
-
-double rms(const Eigen::VectorXd& d) { return d.size() > 0 ? d.norm() / std::sqrt(static_cast<double>(d.size())) : 0; }
 
 std::size_t fitted_poses(const WeightedFit& fit) { return fit.fit.prediction.solution.poses.size(); }
 

@@ -9,6 +9,7 @@
 
 #include "calibration/held_out.h"
 #include "common/error.h"
+#include "common/rms.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -21,8 +22,6 @@ constexpr int first_steps = 3;
 constexpr double place_start_sd = 1.5;  // how far to either side of its usual place an effect is looked for
 constexpr double hopeless_share = 0.6;  // of the best gain: what is behind that after the first steps is left there
 constexpr double tolerated_hopeless_share = 0.25;  // of an effect that errors may imitate: they take half of its gain
-
-double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
 
 /// One candidate on its way. Each has an evaluator of its own, so that it does not matter which thread does what.
 struct Job {
@@ -138,10 +137,13 @@ double occam(const Job& job) {
   };
   const Eigen::MatrixXd covariance =
       information(job.fit, *job.parameters, job.metric).completeOrthogonalDecomposition().pseudoInverse();
-  double sum = 0;
-  for (Eigen::Index i = 0; i < job.parameters->size(); ++i)
-    if (shape(i)) sum += std::log(std::pow(priors[static_cast<std::size_t>(i)]->sd, 2) / covariance(i, i));
-  return std::max(0.0, sum);
+  std::vector<int> rows;
+  double prior = 0;
+  for (int i = 0; i < static_cast<int>(job.parameters->size()); ++i)
+    if (shape(i)) rows.push_back(i), prior += 2 * std::log(priors[static_cast<std::size_t>(i)]->sd);
+  if (rows.empty()) return 0;
+  const Eigen::MatrixXd left = covariance(rows, rows);
+  return std::max(0.0, prior - std::log(left.determinant()));
 }
 
 Refit summary(const RefitProblem& problem, Job& job) {

@@ -23,9 +23,9 @@ struct Refit {
   std::string effect;
   bool solved = false;    ///< whether the chain found an equilibrium with it; nothing below holds otherwise
   bool finished = false;  ///< whether it was followed to the end, or given up early as hopeless
-  int freedom = 0;        ///< parameters of the effect
+  int freedom = 0;        ///< parameters of the effect that the score tests: its strength
   double gain = 0;        ///< fall of F from the base model's
-  double bic = 0;         ///< gain − freedom · ln n − Σ ln(prior variance / variance) over its place and shape
+  double bic = 0;         ///< gain − freedom · ln n − ln(det prior / det covariance) of its place and shape
   double rms_mm = 0, held_out_rms_mm = 0;   ///< fitted points; every block of skin without itself
   std::vector<double> pose_rms_mm;          ///< of every pose that was not fitted, then of each fitted one left out
   std::vector<double> pose_change_mm;       ///< rms of what the effect changes there

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "calibration/held_out.h"
+#include "common/rms.h"
 #include "diagnosis/chi_squared.h"
 
 namespace supine::diagnosis {
@@ -18,8 +19,6 @@ constexpr double same_direction = 0.9;
 constexpr double implausible = 3;
 constexpr int null_draws = 1000;
 constexpr double chance = 0.05;
-
-double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
 
 /// Orthonormal basis of the column space.
 Eigen::MatrixXd basis(const Eigen::MatrixXd& columns) {
@@ -183,7 +182,7 @@ double power_of(const ScoreTable& table, int freedom, double noncentrality) {
 }
 
 double statistic_without(const Score& score, double tolerance) {
-  constexpr double least_share = 0.01;  // of the variance: a difference under it is rounding
+  constexpr double least_share = 0.1;  // of the variance: the slope was another where the tolerance was set
   if (score.step.size() != 1) return score.statistic;
   const double variance = score.step_sd[0] * score.step_sd[0];
   const double rest = std::max(variance - tolerance * tolerance, least_share * variance);

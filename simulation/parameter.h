@@ -15,8 +15,8 @@ struct Parameter {
   double upper = 0;
   /// Typical size: the value where a model names none, and the prior's median. Null where no sign is likelier.
   double median = 0;
-  /// Prior spread. One-sided rows are log-normal: standard deviation of ln(value). Two-sided ones are normal: standard
-  /// deviation of the value itself, in its own unit.
+  /// Prior spread: of one-sided rows the standard deviation of ln(value), of others that of the value itself, in its
+  /// own unit. Its law follows from the range: log-normal where that is positive, else normal.
   double log_sd = 0;
   bool one_sided = false;  ///< only values above null make sense
   std::string meaning;     ///< one line for help and messages

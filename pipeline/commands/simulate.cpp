@@ -5,6 +5,7 @@
 
 #include "common/error.h"
 #include "common/landmarks.h"
+#include "common/rms.h"
 #include "meshing/mesh_io.h"
 #include "pipeline/case.h"
 #include "pipeline/model_file.h"
@@ -41,10 +42,6 @@ constexpr double second_shape_bound_mm = 0.01;
 
 // Prone landmarks are marked on the imaged body: a little noise is to be expected, no more.
 constexpr double landmark_warning_mm = 2, landmark_bound_mm = 10;
-
-double rms(const Eigen::VectorXd& lengths) {
-  return std::sqrt(lengths.squaredNorm() / static_cast<double>(lengths.size()));
-}
 
 /// Surfaces and landmarks that move along with the tissue.
 struct Passenger {

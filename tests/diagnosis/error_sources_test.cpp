@@ -53,5 +53,13 @@ TEST(ErrorSources, WithoutToleranceTakesTheEffectsOwnModeOnly) {
   EXPECT_EQ(without_tolerance_for("adhesion", sources).modes.size(), 4u);
 }
 
+TEST(ErrorSources, APlaceIsNotToleratedAndWhatEachScanErrsByItselfAveragesOut) {
+  const Tolerances t;
+  EXPECT_EQ(tolerance_for("chest_wall_motion", "mm", t), t.chest_wall_mm);
+  EXPECT_EQ(tolerance_for("chest_wall_motion", "1", t), 0);
+  EXPECT_DOUBLE_EQ(shared_tolerance_for("chest_wall_motion", "mm", t, 4), 0.5 * t.chest_wall_mm);
+  EXPECT_EQ(shared_tolerance_for("segmentation_offset", "mm", t, 4), t.segmentation_mm) << "one image for all scans";
+}
+
 }  // namespace
 }  // namespace supine::diagnosis

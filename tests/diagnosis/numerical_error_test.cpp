@@ -7,6 +7,7 @@
 
 #include "calibration/free_parameters.h"
 #include "common/error.h"
+#include "common/rms.h"
 #include "tests/calibration/twin.h"
 
 namespace supine::diagnosis {
@@ -63,8 +64,6 @@ struct LinearOfQuadratic {
   calibration::Scene scene;
   calibration::Fit fit;
 };
-
-double rms(const Eigen::VectorXd& d) { return std::sqrt(d.squaredNorm() / static_cast<double>(d.size())); }
 
 TEST(NumericalError, QuadraticElementsTakeAwayWhatLinearOnesErr) {
   const LinearOfQuadratic f;

@@ -250,6 +250,10 @@ TEST(ScoreTest, AScoreWithoutItsOwnToleranceIsThatUnderErrorsWithoutIt) {
   EXPECT_LT(with.statistic, 0.5 * without.statistic);
   EXPECT_NEAR(statistic_without(with, tolerance), without.statistic, 1e-6 * without.statistic);
   EXPECT_DOUBLE_EQ(statistic_without(with, 0), with.statistic);
+  EXPECT_DOUBLE_EQ(statistic_without(with, 10), 10 * with.statistic) << "no more than that";
+  Score pair = with;
+  pair.step = pair.step_sd = Eigen::Vector2d::Ones();
+  EXPECT_DOUBLE_EQ(statistic_without(pair, tolerance), with.statistic) << "several parameters";
 }
 
 Score scored(const std::string& effect, double step, double sd) {
@@ -265,10 +269,10 @@ TEST(WorthRefitting, WhatIsHiddenByItsOwnToleranceComesFirst) {
   table.scores = {scored("gravity_tilt", 0.8, 0.1), scored("friction", 0.7, 0.1),
                   scored("chest_wall_motion", 3.1, 1.04)};  // T 64, 49, 9; the last 118 without 1 mm of tolerance
   using Names = std::vector<std::string>;
-  EXPECT_EQ(worth_refitting(table, {}, 2), (Names{"chest_wall_motion", "gravity_tilt"}));
-  EXPECT_EQ(worth_refitting(table, {}, 6), (Names{"chest_wall_motion", "gravity_tilt", "friction"}));
+  EXPECT_EQ(worth_refitting(table, {}, 1, 2), (Names{"chest_wall_motion", "gravity_tilt"}));
+  EXPECT_EQ(worth_refitting(table, {}, 1, 6), (Names{"chest_wall_motion", "gravity_tilt", "friction"}));
   table.scores.back() = scored("chest_wall_motion", 2, 1.04);
-  EXPECT_EQ(worth_refitting(table, {}, 6), (Names{"gravity_tilt", "friction"})) << "errors of the usual size";
+  EXPECT_EQ(worth_refitting(table, {}, 1, 6), (Names{"gravity_tilt", "friction"})) << "errors of the usual size";
 }
 
 }  // namespace

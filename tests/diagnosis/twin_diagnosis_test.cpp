@@ -148,7 +148,9 @@ TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
   truth.effects[0].parameters.at("centre_lateral").value = 0.35;
   const Twin twin({truth, noise_mm});
   const auto found = findings_of(twin, 3);
+  ASSERT_EQ(found->diagnosis.verdict, Verdict::missing) << found->diagnosis.why;
   ASSERT_TRUE(names(found->diagnosis, "chest_wall_motion")) << found->diagnosis.why;
+  int seen = 0;
   for (const Refit& refit : found->refits)
     if (refit.effect == "chest_wall_motion")
       for (const FittedParameter& p : refit.parameters) {
@@ -156,12 +158,15 @@ TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
           EXPECT_GT(p.low, 0.05);
           EXPECT_LT(p.low, 0.35);
           EXPECT_GT(p.high, 0.35);
+          ++seen;
         }
         if (p.name == "chest_wall_motion.amplitude_mm") {
           EXPECT_LT(p.low, 6);
           EXPECT_GT(p.high, 6);
+          ++seen;
         }
       }
+  EXPECT_EQ(seen, 2);
 }
 
 TEST(TwinDiagnosis, TheMapOfMissingForcesShowsATractionAndStaysBelowItsThresholdWithoutOne) {

@@ -77,8 +77,24 @@ TEST_P(CatalogueTest, EveryParameterHasTheDerivativeItStates) {
   }
 }
 
+TEST_P(CatalogueTest, PlaceAndShapeAreWhatMovesNothingWhileTheStrengthIsNull) {
+  const auto& rows = GetParam()->parameters();
+  for (std::size_t p = 0; p < rows.size(); ++p) {
+    std::vector<Dual> values;
+    for (const Parameter& row : rows) values.emplace_back(row.null);
+    values[p].v[0] = 1;
+    double largest = 0;
+    for (const char* pose : {"prone", "supine"})
+      largest = std::max(largest, all_numbers(derivatives_of(with(values, pose))).norm());
+    EXPECT_EQ(largest == 0, rows[p].shape) << rows[p].name;
+  }
+}
+
 TEST_P(CatalogueTest, RowsAreConsistent) {
   for (const Parameter& row : GetParam()->parameters()) {
+    if (row.shape) {
+      EXPECT_EQ(row.null, row.median) << row.name;
+    }
     EXPECT_LT(row.lower, row.upper) << row.name;
     EXPECT_GE(row.null, row.lower) << row.name;
     EXPECT_LE(row.null, row.upper) << row.name;
