@@ -12,10 +12,10 @@ const std::vector<Parameter>& ArmTraction::parameters() const {
       {"lateral_kpa", "kPa", 0, -0.6, 0.6, 0, 0.15, false,
        "traction toward the patient's outer side, middle of the patch"},
       {"head_kpa", "kPa", 0, -0.6, 0.6, 0, 0.15, false, "traction toward the head, middle of the patch"},
-      {"centre_lateral", "1", 0.65, 0, 1.2, 0.65, 0.15, false, "the patch's middle from the foot's, in foot radii",
+      {"centre_lateral", "1", 0.65, 0, 1.3, 0.65, 0.15, false, "the patch's middle from the foot's, in foot radii",
        true},
-      {"centre_head", "1", 0.65, 0, 1.2, 0.65, 0.15, false, "the same toward the head", true},
-      {"radius", "1", 0.5, 0.25, 1, 0.5, 0.15, false, "where the patch ends, in foot radii", true}};
+      {"centre_head", "1", 0.65, 0, 1.3, 0.65, 0.15, false, "the same toward the head", true},
+      {"radius", "1", 0.5, 0.3, 1, 0.5, 0.15, false, "where the patch ends, in foot radii", true}};
   return rows;
 }
 

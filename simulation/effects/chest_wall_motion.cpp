@@ -9,9 +9,9 @@ namespace supine::simulation {
 const std::vector<Parameter>& ChestWallMotion::parameters() const {
   static const std::vector<Parameter> rows = {
       {"amplitude_mm", "mm", 0, -15, 15, 0, 5, false, "how far the muscle has come out in the middle of the hill"},
-      {"centre_lateral", "1", 0, -0.6, 0.6, 0, 0.15, false, "the hill's middle from the foot's, in foot radii", true},
-      {"centre_head", "1", 0, -0.6, 0.6, 0, 0.15, false, "the same toward the head", true},
-      {"radius", "1", 1, 0.5, 1.6, 1, 0.15, false, "where the hill ends, in foot radii", true}};
+      {"centre_lateral", "1", 0, -0.4, 0.4, 0, 0.15, false, "the hill's middle from the foot's, in foot radii", true},
+      {"centre_head", "1", 0, -0.4, 0.4, 0, 0.15, false, "the same toward the head", true},
+      {"radius", "1", 1, 0.7, 1.4, 1, 0.15, false, "where the hill ends, in foot radii", true}};
   return rows;
 }
 
