@@ -96,11 +96,12 @@ bool is_borne_out(const Refit& refit, const BaseFigures& base, const VerdictRule
   return fall_of_left_out(refit, base).value_or(1) >= share;
 }
 
-/// Whether the refit stands out from the model as it is (b = 0), and what was not fitted shows it: blocks of skin, or
+/// Whether the refit stands out from the model as it is (b = 0), at a place and width it may have, and what was not
+/// fitted shows it: blocks of skin, or
 /// where its own p is proof enough, because blocks cannot show what lies under one of them alone, another pose. Blocks
 /// and another pose together are as good as such a p.
 bool counts(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
-  if (!refit.finished || !is_borne_out(refit, base, rules)) return false;
+  if (!refit.finished || refit.at_border || !is_borne_out(refit, base, rules)) return false;
   const double p = p_of_effect(table, refit.effect);
   const bool sure = p <= rules.sure_p, skin = improves(refit.held_out_rms_mm, base, rules);
   const bool enough = evidence(refit, base) >= rules.bic;

@@ -68,7 +68,9 @@ struct Diagnosis {
 ///                  do where the evidence is `bic`, or such a pose, or one left out, loses weak_excess_share; with a p
 ///                  under p_value where the evidence is `bic`, the held-out error falls and such a pose loses
 ///                  weak_excess_share. Where one speaks against it (gain below −pose_bic) or has no equilibrium the
-///                  evidence must be `strong_bic`; fitted poses left out, where several are fitted, have to fall too
+///                  evidence must be `strong_bic`; with a place or width at the border of its range it does not count
+///                  (a steep hill of the chest wall is what makes up for a scar); fitted poses left out, where several
+///                  are fitted, have to fall too
 /// ambiguous        others have evidence within `bic` of the best, measurement effects first
 /// unexplained      nothing counts, though the residual is real or the best b is at least `strong_bic`; or the best
 ///                  leaves much of a real residual, or some of it and most of what skin left out, or a pose that was

@@ -146,11 +146,25 @@ double occam(const Job& job) {
   return std::max(0.0, prior - std::log(left.determinant()));
 }
 
+/// Whether a place or width of the effect would rather be beyond its range.
+bool is_at_border(const Job& job) {
+  constexpr double close = 0.01;  // of the range
+  const FreeParameters& parameters = *job.parameters;
+  for (Eigen::Index i = 0; i < parameters.size(); ++i) {
+    const std::string& name = parameters.names()[static_cast<std::size_t>(i)];
+    if (!name.starts_with(job.effect + ".") || !simulation::find_parameter(name)->shape) continue;
+    const double low = parameters.lower()[i], high = parameters.upper()[i], u = job.fit.fit.u[i];
+    if (std::min(u - low, high - u) < close * (high - low)) return true;
+  }
+  return false;
+}
+
 Refit summary(const RefitProblem& problem, Job& job) {
   Refit refit;
   refit.effect = job.effect, refit.solved = job.solved, refit.finished = job.finished, refit.freedom = job.freedom;
   if (!job.solved) return refit;
   const calibration::Fit& fit = job.fit.fit;
+  refit.at_border = is_at_border(job);
   refit.gain = problem.base->objective - job.objective;
   refit.bic = refit.gain - refit.freedom * problem.log_points - occam(job);
   refit.rms_mm = rms(fit.residuals.distance_mm);

@@ -21,11 +21,12 @@ struct FittedParameter {
 /// A candidate added to the model and everything free fitted again, nonlinearly.
 struct Refit {
   std::string effect;
-  bool solved = false;    ///< whether the chain found an equilibrium with it; nothing below holds otherwise
-  bool finished = false;  ///< whether it was followed to the end, or given up early as hopeless
-  int freedom = 0;        ///< parameters of the effect that the score tests: its strength
-  double gain = 0;        ///< fall of F from the base model's
-  double bic = 0;         ///< gain − freedom · ln n − ln(det prior / det covariance) of its place and shape
+  bool solved = false;     ///< whether the chain found an equilibrium with it; nothing below holds otherwise
+  bool finished = false;   ///< whether it was followed to the end, or given up early as hopeless
+  bool at_border = false;  ///< whether a place or width ended at the border of its range: a cause of another kind
+  int freedom = 0;         ///< parameters of the effect that the score tests: its strength
+  double gain = 0;         ///< fall of F from the base model's
+  double bic = 0;          ///< gain − freedom · ln n − ln(det prior / det covariance) of its place and shape
   double rms_mm = 0, held_out_rms_mm = 0;   ///< fitted points; every block of skin without itself
   std::vector<double> pose_rms_mm;          ///< of every pose that was not fitted, then of each fitted one left out
   std::vector<double> pose_change_mm;       ///< rms of what the effect changes there

@@ -90,6 +90,7 @@ Json candidate_json(const Findings& found, const Score& score) {
       {"bic", score.bic},
       {"refit_bic", refit ? Json(refit->bic) : Json(nullptr)},
       {"refit_finished", refit ? Json(refit->finished) : Json(nullptr)},
+      {"at_border", refit ? Json(refit->at_border) : Json(nullptr)},
       {"wrong_sign", score.wrong_sign},
       {"beyond_range", score.beyond_range},
       {"predicted_held_out_rms_mm", score.predicted_held_out_rms_mm},
@@ -171,11 +172,14 @@ void say_refits(const Run& run, const Findings& found) {
     if (!refit.solved)
       run.say(fmt::format("  {:<20}  no equilibrium", refit.effect));
     else
-      run.say(fmt::format(
-          "  {:<20}{:>9.1f}{:>8.3f}{:>10.3f}{:>10}{:>8}{:>8.2f}   {}{}", refit.effect, refit.bic, refit.rms_mm,
-          refit.held_out_rms_mm, refit.pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", refit.pose_rms_mm[0]),
-          unfitted_scans_judge(found, refit) ? fmt::format("{:.1f}", refit.pose_gain) : "-", found.left[r].misfit,
-          values_of(refit.parameters), refit.finished ? "" : " (given up early)"));
+      run.say(fmt::format("  {:<20}{:>9.1f}{:>8.3f}{:>10.3f}{:>10}{:>8}{:>8.2f}   {}{}", refit.effect, refit.bic,
+                          refit.rms_mm, refit.held_out_rms_mm,
+                          refit.pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", refit.pose_rms_mm[0]),
+                          unfitted_scans_judge(found, refit) ? fmt::format("{:.1f}", refit.pose_gain) : "-",
+                          found.left[r].misfit, values_of(refit.parameters),
+                          !refit.finished   ? " (given up early)"
+                          : refit.at_border ? " (place or width at the border of its range)"
+                                            : ""));
   }
 }
 

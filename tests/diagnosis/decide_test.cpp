@@ -240,6 +240,15 @@ TEST(Decide, TheBestThatLeavesARealResidualIsNamedAsNoMoreThanThat) {
   EXPECT_GT(d.left.misfit, 2);
 }
 
+TEST(Decide, WhatWouldHaveToBeElsewhereThanItCanBeIsNotNamed) {
+  Refit steep = refit("chest_wall_motion", 60, 0.8);
+  steep.at_border = true;
+  EXPECT_EQ(verdict({steep}).verdict, Verdict::unexplained);
+  const Diagnosis beside = verdict({steep, refit("ligament", 20, 0.8)});
+  EXPECT_EQ(beside.verdict, Verdict::ambiguous) << "a rival still";
+  EXPECT_EQ(beside.missing, (Names{"ligament", "chest_wall_motion"}));
+}
+
 TEST(Decide, ARefitThatWasGivenUpEarlyIsNotNamed) {
   Refit early = refit("ligament", 60, 0.8);
   early.finished = false;

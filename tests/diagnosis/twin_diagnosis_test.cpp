@@ -169,6 +169,21 @@ TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
   EXPECT_EQ(seen, 2);
 }
 
+TEST(TwinDiagnosis, ARefitSaysThatAPlaceEndsAtTheBorderOfItsRange) {
+  const auto ends_there = [](double centre) {
+    simulation::Model truth = with("chest_wall_motion", "amplitude_mm", 8);
+    truth.effects[0].parameters.at("centre_lateral").value = centre;
+    const Twin twin({truth, noise_mm});
+    const Subject subject = subject_of(twin);
+    const auto found = findings_of(subject, 0);
+    const auto refits =
+        refit_candidates(refit_problem(subject, *found, {}), found->candidates, found->table, {"chest_wall_motion"});
+    return refits.at(0).finished && refits.at(0).at_border;
+  };
+  EXPECT_TRUE(ends_there(0.55));
+  EXPECT_FALSE(ends_there(0.2));
+}
+
 TEST(TwinDiagnosis, TheMapOfMissingForcesShowsATractionAndStaysBelowItsThresholdWithoutOne) {
   const auto map_of = [](const Twin& twin, const Findings& found) {
     return force_map(twin.scene(), found.model, found.base, found.metric, 1, 40);
