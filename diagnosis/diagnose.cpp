@@ -97,9 +97,8 @@ bool is_borne_out(const Refit& refit, const BaseFigures& base, const VerdictRule
 }
 
 /// Whether the refit stands out from the model as it is (b = 0), at a place and width it may have, and what was not
-/// fitted shows it: blocks of skin, or
-/// where its own p is proof enough, because blocks cannot show what lies under one of them alone, another pose. Blocks
-/// and another pose together are as good as such a p.
+/// fitted shows it: blocks of skin, or where its own p is proof enough, because blocks cannot show what lies under one
+/// of them alone, another pose. Blocks and another pose together are as good as such a p.
 bool counts(const Refit& refit, const ScoreTable& table, const BaseFigures& base, const VerdictRules& rules) {
   if (!refit.finished || refit.at_border || !is_borne_out(refit, base, rules)) return false;
   const double p = p_of_effect(table, refit.effect);

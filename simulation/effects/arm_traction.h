@@ -6,8 +6,8 @@
 namespace supine::simulation {
 
 /// The arm lies otherwise than in the scanner and pulls on the skin: a dead traction on a smooth patch around
-/// q = (0.65, 0.65), toward the armpit, 0.5 foot radii wide, or where the other parameters say, along the anatomy's
-/// lateral and head directions. Every pose but prone.
+/// q = (0.65, 0.65), toward the armpit, 0.5 foot radii wide, unless centre and radius say otherwise; along the
+/// anatomy's lateral and head directions. Every pose but prone.
 class ArmTraction : public Effect {
  public:
   std::string name() const override { return "arm_traction"; }

@@ -3,16 +3,16 @@
 
 #include <Eigen/Core>
 
+#include "simulation/catalogue.h"
+
 namespace supine::simulation {
 
 /// A smooth hill over anatomy coordinates: (1 - r²)³ with r = |q - centre|/radius, 0 from r = 1 on. Twice continuously
-/// differentiable, 1 in the middle.
-/// @tparam T  double, or a dual number for the derivatives with respect to place and radius
-template <class T>
-T bump(const Eigen::Vector2d& q, const T& centre_x, const T& centre_y, const T& radius) {
-  const T x = q.x() - centre_x, y = q.y() - centre_y;
-  const T rest = 1.0 - (x * x + y * y) / (radius * radius);
-  return rest > T(0.0) ? rest * rest * rest : T(0.0);
+/// differentiable, 1 in the middle. All in foot radii.
+inline Dual bump(const Eigen::Vector2d& q, const Dual& centre_lateral, const Dual& centre_head, const Dual& radius) {
+  const Dual lateral = q.x() - centre_lateral, head = q.y() - centre_head;
+  const Dual rest = 1.0 - (lateral * lateral + head * head) / (radius * radius);
+  return rest.a > 0 ? rest * rest * rest : Dual(0.0);
 }
 
 }  // namespace supine::simulation

@@ -6,8 +6,8 @@
 namespace supine::simulation {
 
 /// The rigid muscle is somewhere else than in the image: under the mound it has come out along its normal by
-/// amplitude_mm in the middle of the foot, fading smoothly to nothing at the foot's mean radius, or about where the
-/// other parameters say, within what a breath or another posture can do. Every pose but prone.
+/// amplitude_mm in the middle of the foot, fading smoothly to nothing at the foot's mean radius, unless centre
+/// and radius say otherwise. Every pose but prone.
 class ChestWallMotion : public Effect {
  public:
   std::string name() const override { return "chest_wall_motion"; }
