@@ -11,6 +11,7 @@
 #include "diagnosis/other_mesh.h"
 #include "diagnosis/weighted_fit.h"
 #include "meshing/topology.h"
+#include "simulation/pushed_forward.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -221,13 +222,13 @@ std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& wh
       linear.poses.push_back({.name = whole.measurements[m]->pose.name, .x = linear.X, .report = {}});
     const calibration::Prediction given =
         calibration::Evaluator(whole, fitted.model, accurate_enough()).predict(fitted.model, &linear);
-    // As far from the undeformed shape as with linear elements: from where these have the pose, or from the undeformed
-    // shape, it takes up to twice the work.
     simulation::ChainSolution start = fitted.finer;
+    const Points X = on_quadratic(mesh, given.solution.X);
     for (std::size_t p = count; p < given.solution.poses.size(); ++p) {
       const simulation::PoseSolution& pose = given.solution.poses[p];
-      const Points moved = on_quadratic(mesh, pose.x - given.solution.X);
-      start.poses.push_back({.name = pose.name, .x = start.X + moved, .report = {}});
+      const Points x = on_quadratic(mesh, pose.x);
+      start.poses.push_back(
+          {.name = pose.name, .x = simulation::pushed_forward(mesh.cells, x, X, start.X), .report = {}});
     }
     return change_of_others(count, given, predicted_on(whole, mesh, fitted.model, &start, few));
   } catch (const NumericalFailure&) {

@@ -141,20 +141,20 @@ std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const fs::path& folde
 
 struct LiveProgress::State {
   const Run& run;
+  std::chrono::seconds pause;
   std::mutex mutex;
   bool terminal = isatty(STDERR_FILENO) != 0;
   std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
 };
 
-LiveProgress::LiveProgress(const Run& run) : state_(new State{run, {}}) {}
+LiveProgress::LiveProgress(const Run& run, std::chrono::seconds pause) : state_(new State{run, pause, {}}) {}
 LiveProgress::~LiveProgress() = default;
 
 void LiveProgress::show(const std::string& line) {
-  constexpr auto pause = std::chrono::seconds(5);
   const std::lock_guard lock(state_->mutex);
   if (state_->terminal) return state_->run.progress(line);
   const auto now = std::chrono::steady_clock::now();
-  if (now - state_->last < pause) return;
+  if (now - state_->last < state_->pause) return;
   state_->last = now;
   state_->run.say("  " + line);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <vector>
@@ -44,11 +45,12 @@ std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const std::filesystem
                                                  const std::filesystem::path& mesh_file,
                                                  const std::filesystem::path& model_file);
 
-/// Progress of long work: one line that overwrites itself on a terminal, a line of its own every few seconds where
-/// standard error is a file or a pipe. Threads may call it at the same time.
+/// Progress of long work: one line that overwrites itself on a terminal, a line of its own where standard error is a
+/// file or a pipe. Threads may call it at the same time.
 class LiveProgress {
  public:
-  explicit LiveProgress(const Run& run);
+  /// @param pause  least time between two lines in a file or a pipe; none where each line begins work of its own
+  explicit LiveProgress(const Run& run, std::chrono::seconds pause = std::chrono::seconds(5));
   ~LiveProgress();
   void show(const std::string& line);
 

@@ -5,6 +5,7 @@
 
 #include "common/error.h"
 #include "simulation/folds.h"
+#include "simulation/pushed_forward.h"
 
 namespace supine::simulation {
 namespace {
@@ -77,7 +78,7 @@ ChainSolution Chain::solve(const Model& model, const ChainSolution* near, Invers
   for (std::size_t p = 1; p < poses_.size(); ++p) {
     load(model, poses_[p]);
     Points start;
-    if (near != nullptr) start = solution.X + (near->poses[p - 1].x - near->X);
+    if (near != nullptr) start = pushed_forward(mesh.cells, near->poses[p - 1].x, near->X, solution.X);
     PoseSolution pose{poses_[p].name, {}, {}};
     pose.report = solver_.forward(solution.X, pose.x, "undeformed → " + pose.name, near != nullptr ? &start : nullptr);
     check_cells(mesh, pose.x, solution.X, pose.name, pose.report);

@@ -78,7 +78,7 @@ class DiagnoseTool : public Tool {
     calibration::Evaluator evaluator(measured->fitted_scene(), measured->model);
     const std::vector<double> noise = measured->noise_mm(evaluator);
     run.stage("examine");
-    LiveProgress live(run);
+    LiveProgress live(run, std::chrono::seconds(0));
     options_.other_meshes = !no_other_meshes_;
     options_.tolerances.registration_rad = options_.tolerances.registration_mm / turn_arm_mm;
     options_.progress = [&live](const std::string& what) { live.show(what); };
