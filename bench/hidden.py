@@ -7,7 +7,8 @@
 
 WORK/cases/case-001 ... what the tools read; WORK/answers/case-001.json the answers; WORK/out/case-001 what the tools
 wrote. A second call goes on where the first stopped. --again diagnoses the cases that are there once more into
-WORK/out-LABEL (--label LABEL), with mesh and calibration as they are. Standard library only.
+WORK/out-LABEL (--label LABEL), with mesh and calibration as they are; with --no-tilt from WORK/cases-no-tilt, the same
+cases without their tilted scan. Standard library only.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import json
 import os
 import pathlib
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -114,13 +116,24 @@ def diagnose_case(work, binaries, name):
             return
 
 
-def diagnose_again(work, binaries, name, label):
+def without_tilt(work, name):
+    """The case with the supine scan alone: what another pose measured is not there."""
+    case = work / "cases-no-tilt" / name
+    if not case.exists():
+        shutil.copytree(work / "cases" / name, case, ignore=shutil.ignore_patterns("tilt*"))
+        sections = re.split(r"(?m)^(?=\[)", (case / "case.toml").read_text())
+        (case / "case.toml").write_text("".join(s for s in sections if not s.startswith("[pose.tilt")))
+    return case
+
+
+def diagnose_again(work, binaries, name, label, tilt=True):
     source, out = work / "out" / name, work / f"out-{label}" / name
     if not (source / "model.toml").exists() or (out / "diagnosis.json").exists() or (out / "failed").exists():
         return
     out.mkdir(parents=True, exist_ok=True)
-    code, seconds = run([binaries / "supine-diagnose", work / "cases" / name, source / "mesh.vtu", "--model",
-                         source / "model.toml", "-o", out, "--threads", "1", "--force"],
+    case = work / "cases" / name if tilt else without_tilt(work, name)
+    code, seconds = run([binaries / "supine-diagnose", case, source / "mesh.vtu", "--model", source / "model.toml",
+                         "-o", out, "--threads", "1", "--force"],
                         work / "logs" / f"{name}.{label}.txt")
     note_seconds(out, {"diagnose": seconds})
     if code == 0 or code == 1:
@@ -131,7 +144,7 @@ def diagnose_again(work, binaries, name, label):
 
 def one_case(work, options, name, words):
     if options.again:
-        diagnose_again(work, options.bin, name, options.label)
+        diagnose_again(work, options.bin, name, options.label, not options.no_tilt)
         return name
     words = words + ([] if options.no_tilt else ["--tilt"])
     made, seconds = make_case(work, options.bin, name, words)

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "diagnosis/examine.h"
 #include "diagnosis/hot_spots.h"
+#include "diagnosis/ladder.h"
 #include "diagnosis/next_measurement.h"
 #include "simulation/parameters.h"
 #include "tests/calibration/twin.h"
@@ -99,6 +101,19 @@ TEST_F(NullTwin, AFurtherPoseSeparatesMoreThanTheSameAgain) {
   EXPECT_GT(next.front().separation, again);
 }
 
+TEST_F(NullTwin, TheLessIsKnownOfWhereAScanLiesTheLessAFurtherOneSeparates) {
+  const auto separation = [](double registration_mm) {
+    const Tolerances known = found->tolerances;
+    found->tolerances.registration_mm = registration_mm, found->tolerances.registration_rad = registration_mm / 80;
+    const auto next = next_measurements(subject_of(*twin), *found, {"adhesion", "gravity_tilt"});
+    found->tolerances = known;
+    double best = 0;
+    for (const Separation& s : next) best = std::max(best, s.separation);
+    return best;
+  };
+  EXPECT_LT(separation(2), 0.9 * separation(0.05));
+}
+
 TEST_F(NullTwin, TheHotSpotIsWhereTheDistanceIs) {
   constexpr double depth_mm = -2, radius_mm = 30;
   const calibration::ModelSkin skin(twin->mesh, found->base.fit.prediction.solution.poses[0].x);
@@ -182,6 +197,33 @@ TEST(TwinDiagnosis, ARefitSaysThatAPlaceEndsAtTheBorderOfItsRange) {
   };
   EXPECT_TRUE(ends_there(0.55));
   EXPECT_FALSE(ends_there(0.2));
+}
+
+TEST(TwinDiagnosis, ALadderAddsTwoEffectsOneAfterTheOtherAndShowsWhatElseCouldHaveBeenAdded) {
+  simulation::Model truth = with("gravity_tilt", "roll_rad", 0.2);
+  truth.effects.push_back(with("chest_wall_motion", "amplitude_mm", 7).effects[0]);
+  const Twin twin({truth, noise_mm});
+  const Subject subject = subject_of(twin);
+  ExamineOptions options;
+  options.other_meshes = false;
+  options.refits = 2;
+  options.tolerances = {0.05, 0.001, 0.05, 0.05, 1};
+  const Ladder ladder = climb(subject, options, *examine(subject, options));
+  ASSERT_EQ(ladder.rungs.size(), 3u) << ladder.stopped;
+  std::set<std::string> added;
+  for (std::size_t r = 1; r < ladder.rungs.size(); ++r) {
+    const Rung &rung = ladder.rungs[r], &before = ladder.rungs[r - 1];
+    added.insert(rung.added);
+    EXPECT_LT(rung.held_out_rms_mm, before.held_out_rms_mm);
+    ASSERT_TRUE(rung.refit_only.has_value());
+    EXPECT_EQ(rung.refit_only->rms_mm, before.rms_mm);
+    ASSERT_TRUE(rung.random_other.has_value());
+    EXPECT_FALSE(added.contains(rung.random_other->added)) << rung.random_other->added << " is in the model already";
+    EXPECT_LT(rung.rms_mm, rung.random_other->rms_mm);
+  }
+  EXPECT_EQ(added, (std::set<std::string>{"gravity_tilt", "chest_wall_motion"}));
+  EXPECT_EQ(ladder.last.verdict, Verdict::nothing_missing) << ladder.last.why;
+  EXPECT_EQ(ladder.model.effects.size(), 2u);
 }
 
 TEST(TwinDiagnosis, TheMapOfMissingForcesShowsATractionAndStaysBelowItsThresholdWithoutOne) {

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+// What the built tool tells beside its answer, on the run that the tests of the pipeline share.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/pipeline/process.h"
+#include "tests/pipeline/small_run.h"
+#include "tests/pipeline/temporary_folder.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+class DiagnoseTool : public testing::Test {
+ protected:
+  void SetUp() override { run_process({"cp", "-a", small_run().string(), case_.string()}); }
+
+  Finished diagnose(const std::vector<std::string>& more) const {
+    std::vector<std::string> words = {tool("diagnose"),
+                                      case_.string(),
+                                      (case_ / "out/mesh.vtu").string(),
+                                      "--model",
+                                      (case_ / "model.toml").string(),
+                                      "-o",
+                                      found_.string(),
+                                      "--refit",
+                                      "1"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_process(words);
+  }
+
+  TemporaryFolder folder_;
+  fs::path case_ = folder_ / "case", found_ = folder_ / "found";
+};
+
+TEST_F(DiagnoseTool, TellsEveryStepItBegins) {
+  const Finished finished = diagnose({});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  std::size_t before = 0;
+  for (const char* step : {"sensitivities", "two other meshes", "fit under all errors", "catalogue", "scores"}) {
+    const std::size_t at = finished.out.find(std::string("\n  ") + step + "\n");
+    ASSERT_NE(at, std::string::npos) << step << " is not in:\n" << finished.out;
+    EXPECT_GT(at, before) << step;
+    before = at;
+  }
+}
+
+TEST_F(DiagnoseTool, WarnsWhereTheErrorOfTheMeshIsGuessed) {
+  const Finished finished = diagnose({"--no-other-meshes"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  EXPECT_NE(finished.err.find("the error of the mesh is guessed from the residual (not asked for)"), std::string::npos)
+      << finished.err;
+  const Json json = Json::parse(std::ifstream(found_ / "diagnosis.json"));
+  EXPECT_NE(json["warnings"].dump().find("guessed from the residual"), std::string::npos) << json["warnings"];
+}
+
+}  // namespace
+}  // namespace supine::pipeline
