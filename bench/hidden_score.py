@@ -18,7 +18,7 @@ import statistics
 
 SEEN = 0.9  # power from which an effect counts as one that the data can see
 # The phantom's region has another shape or place than the catalogue's: its size is not quite the same quantity.
-ELSEWHERE = ("arm_traction", "chest_wall_motion", "ligament")
+RESHAPED = ("arm_traction", "chest_wall_motion", "ligament")
 VERDICTS = ("nothing_missing", "missing", "ambiguous", "unexplained", "failed")
 
 
@@ -174,9 +174,9 @@ def rates(cases):
              ("outside the catalogue: unexplained", count(outside, is_outcome("unexplained")), len(outside))]
     right = [row for case in effect if outcome(case) == "right" for row in case["intervals"]]
     moduli = [row for case in null for row in case["moduli"]]
-    elsewhere = [row for row in right if row[0].split(".")[0] in ELSEWHERE]
-    same = [row for row in right if row[0].split(".")[0] not in ELSEWHERE]
-    for what, rows in (("", same), (f" ({', '.join(ELSEWHERE)}: placed otherwise)", elsewhere)):
+    reshaped = [row for row in right if row[0].split(".")[0] in RESHAPED]
+    same = [row for row in right if row[0].split(".")[0] not in RESHAPED]
+    for what, rows in (("", same), (f" ({', '.join(RESHAPED)}: shaped otherwise)", reshaped)):
         table.append((f"95 % intervals of rightly named effects that hold the truth{what}",
                       count(rows, lambda r: r[2] <= r[1] <= r[3]), len(rows)))
     table.append(("95 % intervals of calibrated moduli of nulls that hold the truth",

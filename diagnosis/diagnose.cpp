@@ -111,6 +111,13 @@ bool counts(const Refit& refit, const ScoreTable& table, const BaseFigures& base
   return p < rules.p_value && skin && pose && enough;
 }
 
+/// Whether the fitted skin, skin left out and a pose that was not fitted all show it: then it needs no p. A score has
+/// to get past the tolerance for its own effect, which hides most of an effect that errors may imitate.
+bool is_shown_by_all(const Refit& refit, const BaseFigures& base, const VerdictRules& rules) {
+  return refit.bic >= rules.bic && say_of_unfitted(refit, base) >= rules.bic &&
+         improves(refit.held_out_rms_mm, base, rules);
+}
+
 bool comes_near(const Refit& refit, const Refit& best, double misfit, const BaseFigures& base,
                 const VerdictRules& rules) {
   return evidence(best, base) - evidence(refit, base) < rules.bic * std::max(1.0, misfit);
@@ -226,14 +233,16 @@ LackOfFit lack_of_fit(const WeightedFit& fit, const Metric& metric) {
 Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, const std::vector<LackOfFit>& left,
                  const BaseFigures& base, const VerdictRules& rules) {
   const double p = p_of(table);
-  if (p >= rules.p_value && !is_real(base.left, rules)) {
+  const std::vector<const Refit*> good = best_and_rivals(table, refits, left, base, rules);
+  const bool more_than_errors = base.left.p_value < rules.lack_of_fit_p;
+  const bool shown = !good.empty() && more_than_errors && is_shown_by_all(*good.front(), base, rules);
+  if (p >= rules.p_value && !is_real(base.left, rules) && !shown) {
     Diagnosis result;
     result.left = base.left;
     result.why =
         fmt::format("errors of scan, registration and mesh alone score as high as the best effect (p {:.3f})", p);
     return result;
   }
-  const std::vector<const Refit*> good = best_and_rivals(table, refits, left, base, rules);
   if (good.empty()) return nothing_counts(p, refits, base, rules);
   const Refit& best = *good.front();
   Diagnosis result;
@@ -248,7 +257,10 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
   std::stable_partition(result.missing.begin(), result.missing.end(), is_measurement_effect);
   result.verdict = result.missing.size() == 1 ? Verdict::missing : Verdict::ambiguous;
   result.why = result.verdict == Verdict::missing ? "no other effect comes near" : "these do equally well";
-  if (!improves(best.held_out_rms_mm, base, rules))
+  if (p >= rules.p_value && shown)
+    result.why += fmt::format("; the whole skin, skin left out and another scan show it, its score does not (p {:.3f})",
+                              p_of_effect(table, best.effect));
+  else if (!improves(best.held_out_rms_mm, base, rules))
     result.why +=
         fmt::format("; named by its p ({:.3f}), the held-out error does not show it", p_of_effect(table, best.effect));
   return result;

@@ -59,7 +59,9 @@ struct Diagnosis {
   LackOfFit left;                    ///< after the best
 };
 
-/// nothing_missing  no score that chance would not give (p), or nothing that lowers the held-out error
+/// nothing_missing  no score that chance would not give (p), or nothing that lowers the held-out error. Where errors
+///                  would not leave what is left (lack_of_fit_p), p is not asked of the best if b, the held-out error
+///                  and poses that were not fitted show it each: a score has to get past the effect's own tolerance
 /// missing          one refit counts and no other comes near. Its evidence is b plus what poses that were not fitted
 ///                  gain with it (Refit::pose_gain; at most twice b for it, nothing where they end further off, in
 ///                  full against it). It counts where b and evidence are `bic` or more and the held-out error falls,

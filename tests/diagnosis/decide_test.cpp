@@ -114,6 +114,20 @@ TEST(Decide, SkinAndAnotherScanTogetherNameWhatStandsOutALittle) {
   EXPECT_EQ(with(0.03, 7, 5, 1.5, 0.97), Verdict::nothing_missing);
 }
 
+TEST(Decide, WhatSkinLeftOutAndAnotherScanShowEachNeedsNoPWhereMoreIsLeftThanErrorsLeave) {
+  const auto with = [](double left_p, double bic, double gain, double held_out_mm) {
+    const Refit r = seen_elsewhere(refit("chest_wall_motion", bic, held_out_mm), gain, 0.8);
+    return decide(table_with(0.07), {r}, {nothing_left}, with_unfitted_pose({1.15, left_p}));
+  };
+  const Diagnosis shown = with(1e-4, 17, 60, 1.2);
+  EXPECT_EQ(shown.verdict, Verdict::missing);
+  EXPECT_NE(shown.why.find("its score does not"), std::string::npos) << shown.why;
+  EXPECT_EQ(with(0.02, 17, 60, 1.2).verdict, Verdict::nothing_missing) << "errors leave as much";
+  EXPECT_EQ(with(1e-4, 5, 60, 1.2).verdict, Verdict::nothing_missing) << "b";
+  EXPECT_EQ(with(1e-4, 17, 5, 1.2).verdict, Verdict::nothing_missing) << "the other scan";
+  EXPECT_EQ(with(1e-4, 17, 60, 1.38).verdict, Verdict::nothing_missing) << "skin left out";
+}
+
 TEST(Decide, WhatAnotherScanHasAboveTheNoiseIsAboveItsOwn) {
   BaseFigures base = with_unfitted_pose(real_left);
   base.pose_rms_mm = {1.6};

@@ -92,7 +92,7 @@ class Scored(unittest.TestCase):
         # 2.0 lies in [1, 3] of the first ligament, not in [2.5, 3] of adhesion.
         spans = "95 % intervals of rightly named effects that hold the truth"
         self.assertEqual(rates[spans], (0, 1))
-        self.assertEqual(rates[spans + " (arm_traction, chest_wall_motion, ligament: placed otherwise)"], (1, 1))
+        self.assertEqual(rates[spans + " (arm_traction, chest_wall_motion, ligament: shaped otherwise)"], (1, 1))
 
     def test_written_table_is_the_printed_one(self):
         hidden_score.write(self.cases, self.root / "score")
