@@ -65,6 +65,13 @@ simulation::SolveOptions enough() {
   return options;
 }
 
+/// The same from a solution near by: where that leads nowhere, a load in steps takes minutes and ends nowhere as well.
+simulation::SolveOptions enough_from_near() {
+  simulation::SolveOptions options = enough();
+  options.smallest_load_step = 1;
+  return options;
+}
+
 /// The model on another mesh.
 /// @param near  solution on @p mesh to start from, or nullptr
 calibration::Prediction predicted_on(const calibration::Scene& scene, const meshing::TetMesh& mesh,
@@ -116,7 +123,7 @@ void measure_finer(const calibration::Scene& scene, const simulation::Model& mod
   const simulation::ChainSolution& linear = fit.prediction.solution;
   const bool known = near != nullptr && near->finer.X.rows() == mesh.points.rows();
   const simulation::ChainSolution start = known ? followed(mesh, *near, linear) : on_quadratic(mesh, linear);
-  calibration::Prediction finer = predicted_on(scene, mesh, model, &start, enough());
+  calibration::Prediction finer = predicted_on(scene, mesh, model, &start, enough_from_near());
   result.finer_mm = change_of(fit.residuals, finer);
   result.model = model, result.given = linear, result.finer = std::move(finer.solution);
 }
@@ -212,9 +219,8 @@ std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& wh
   const std::size_t count = fitted.finer.poses.size();
   if (count == 0 || whole.measurements.size() == count) return {};
   // They only confirm: a pose that does not come out in a few steps is left as it is.
-  simulation::SolveOptions few = enough();
+  simulation::SolveOptions few = enough_from_near();
   few.max_iterations = 16;
-  few.smallest_load_step = 1;
   try {
     const meshing::TetMesh mesh = meshing::to_quadratic(*whole.mesh);
     simulation::ChainSolution linear = fitted.given;
