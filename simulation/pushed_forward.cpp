@@ -31,8 +31,13 @@ Points pushed_forward(const Indices& cells, const Points& x, const Points& X, co
       volume[node] += weight;
     }
   }
-  for (Eigen::Index n = 0; n < x.rows(); ++n)
-    pushed.row(n) = x.row(n) + (volume[n] > 0 ? Eigen::RowVector3d(pushed.row(n) / volume[n]) : change.row(n).eval());
+  for (Eigen::Index n = 0; n < x.rows(); ++n) {
+    const bool held = x.row(n) == X.row(n);
+    if (held || !(volume[n] > 0))
+      pushed.row(n) = x.row(n) + change.row(n);
+    else
+      pushed.row(n) = x.row(n) + pushed.row(n) / volume[n];
+  }
   return pushed;
 }
 

@@ -40,13 +40,21 @@ TEST(PushedForward, IsTheDeformationItselfWhereThatIsTheSameEverywhere) {
 
 TEST(PushedForward, LeavesAShapeWhoseUndeformedOneDidNotMove) {
   const meshing::TetMesh& mesh = supine::testing::dome_scene(2).mesh;
-  const Points x = wave(mesh.points, 1.5);
+  const Points x = wave(mesh.points, 1.5);  // no node stays where it was
   EXPECT_EQ((pushed_forward(mesh.cells, x, mesh.points, mesh.points) - x).cwiseAbs().maxCoeff(), 0);
+}
+
+TEST(PushedForward, ANodeThatDidNotMoveStaysOnItsUndeformedPlace) {
+  const meshing::TetMesh& mesh = supine::testing::dome_scene(1).mesh;
+  Points x = mesh.points * large_deformation().transpose();
+  x.row(7) = mesh.points.row(7);
+  const Points moved = wave(mesh.points, 2);
+  EXPECT_LT((pushed_forward(mesh.cells, x, mesh.points, moved) - moved).row(7).norm(), 1e-12);
 }
 
 TEST(PushedForward, KeepsTheVolumeThatMovingByTheSameWayDoesNot) {
   const meshing::TetMesh& mesh = supine::testing::dome_scene(2).mesh;
-  Points x = mesh.points * large_deformation().transpose();
+  Points x = (mesh.points * large_deformation().transpose()).rowwise() + Eigen::RowVector3d(3, -2, 5);
   x.col(1) += x.col(0).cwiseAbs2() / 150;
   const Points moved = wave(mesh.points, 0.4);
   const Eigen::VectorXd before = cell_det_f_at_points(mesh.cells, x, mesh.points);
