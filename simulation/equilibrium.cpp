@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 #include "common/error.h"
 
@@ -153,7 +154,8 @@ bool EquilibriumSolver::search_line(Unknown unknown, const Points& known, Points
                                     const Eigen::VectorXd& step) {
   const bool use_energy = unknown == Unknown::deformed && mechanics_.has_energy();
   const double norm = sums_.residual.norm(), energy = sums_.energy, slope = sums_.residual.dot(step);
-  const double natural = use_energy ? 0 : direction_.natural_mm(sums_.residual);
+  const Eigen::VectorXd residual = sums_.residual;
+  std::optional<double> natural;  // of that residual
   const double least_det_f = largest_fall * std::min(sums_.min_det_f, 1.0);
   const bool last_digits = step.cwiseAbs().maxCoeff() < options_.step_tolerance_mm;
   const Points start = sought;
@@ -170,7 +172,9 @@ bool EquilibriumSolver::search_line(Unknown unknown, const Points& known, Points
         go_further(unknown, known, start, sought, load, step, slope, least_det_f);
       return true;
     }
-    if (!use_energy && direction_.natural_mm(sums_.residual) <= (1 - natural_decrease * alpha) * natural) return true;
+    if (use_energy) continue;
+    if (!natural) natural = direction_.natural_mm(residual);
+    if (direction_.natural_mm(sums_.residual) <= (1 - natural_decrease * alpha) * *natural) return true;
   }
   sought = start;
   return false;

@@ -3,13 +3,19 @@
 
 #include <Eigen/Jacobi>
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 namespace supine::simulation {
+namespace {
+
+constexpr int first_judged = 6;  // the residual goes up and down before it falls steadily
+
+}  // namespace
 
 KrylovReport Krylov::conjugate_gradients(const LinearMap& matrix, const LinearMap& preconditioner,
                                          const Eigen::VectorXd& b, double tolerance, int max_iterations,
-                                         Eigen::VectorXd& x) {
+                                         Eigen::VectorXd& x, double worth) {
   for (Eigen::VectorXd* work : {&r_, &z_, &p_, &q_}) work->resize(size_);
   KrylovReport report;
   x.setZero(size_);
@@ -36,7 +42,8 @@ KrylovReport Krylov::conjugate_gradients(const LinearMap& matrix, const LinearMa
     r_ -= alpha * q_;
     report.reduction = r_.norm() / norm;
     report.converged = report.reduction <= tolerance;
-    if (report.converged) break;
+    const double on_the_way = std::pow(worth, static_cast<double>(report.iterations) / max_iterations);
+    if (report.converged || (report.iterations >= first_judged && report.reduction > on_the_way)) break;
   }
   return report;
 }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 
 #include "simulation/assembly.h"
 
@@ -24,8 +25,12 @@ class Krylov {
   explicit Krylov(Eigen::Index size) : size_(size) {}
 
   /// Conjugate gradients (Hestenes and Stiefel 1952) for symmetric positive definite A and preconditioner, from x = 0.
+  /// Where A is not positive definite they stop at the first direction that shows it, x still one of descent of
+  /// ½ xᵀ A x - bᵀ x (Steihaug 1983).
+  /// @param worth  gives up when the residual falls too slowly to come to this reduction in max_iterations
   KrylovReport conjugate_gradients(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b,
-                                   double tolerance, int max_iterations, Eigen::VectorXd& x);
+                                   double tolerance, int max_iterations, Eigen::VectorXd& x,
+                                   double worth = std::numeric_limits<double>::infinity());
 
   /// GMRES without restart (Saad and Schultz 1986), preconditioned from the right so that its residual is the true
   /// one, from x = 0.

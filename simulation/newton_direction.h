@@ -12,9 +12,11 @@ namespace supine::simulation {
 /// Newton steps for one Mechanics: solves ∂r/∂x s = -r or ∂r/∂X s = -r.
 ///
 /// One factor of ∂r/∂x (or, on large meshes, one multigrid hierarchy) is kept and used as preconditioner for as long as
-/// Krylov iterations with it are cheaper than a new one. -∂r/∂X is close to ∂r/∂x (equal to first order for small
-/// strain), so the same factor serves the inverse solve, whose matrix is not symmetric and would cost three times as
-/// much to factorise.
+/// Krylov iterations with it are cheaper than a new one. Where ∂r/∂x is not positive definite a changed one that is
+/// gets factorised, and close to the answer conjugate gradients with it on ∂r/∂x itself find the step, up to where they
+/// meet a direction of negative curvature: the changed tangent alone is too stiff and creeps. -∂r/∂X is close to
+/// ∂r/∂x F (moving a point of the body together with its place leaves what is balanced balanced), so the same factor
+/// serves the inverse solve, whose matrix is not symmetric and would cost three times as much to factorise.
 class NewtonDirection {
  public:
   explicit NewtonDirection(const Mechanics& mechanics);
@@ -42,9 +44,13 @@ class NewtonDirection {
   int factorisations() const { return factorisations_; }
 
  private:
-  bool factorise(const State& state, double tolerance, Sums& sums, Eigen::VectorXd* step);
+  bool factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step);
+  bool step_with_new_factor(const State& state, double tolerance, double shift, bool close, Sums& sums,
+                            Eigen::VectorXd& step);
   bool by_conjugate_gradients(double tolerance, double shift, int most, const Sums& sums, Eigen::VectorXd& step);
-  bool by_gmres(const SparseMatrix& matrix, double sign, double tolerance, const Sums& sums, Eigen::VectorXd& step);
+  bool by_gmres(const SparseMatrix& matrix, const LinearMap& preconditioner, double tolerance, const Sums& sums,
+                Eigen::VectorXd& step);
+  int worth_of_factor(int least, int most) const;
 
   const Mechanics& mechanics_;
   std::unique_ptr<SpdSolver> factor_;
@@ -53,7 +59,8 @@ class NewtonDirection {
   bool have_factor_ = false;
   bool outworn_ = false;  // the last Krylov solve cost more than a new factor would
   bool exact_ = true;
-  double shift_ = 0;  // of the tangent that was factorised last when the exact one was not positive definite
+  bool bent_ = false;  // this step's exact tangent has shown negative curvature: it has no Cholesky factor
+  double shift_ = 0;   // of the tangent that was factorised last when the exact one was not positive definite
   int factorisations_ = 0;
 };
 

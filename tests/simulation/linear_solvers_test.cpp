@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "simulation/krylov.h"
 #include "simulation/linear_solver.h"
 #include "tests/simulation/scene.h"
@@ -83,6 +85,47 @@ TEST_F(LinearSolversTest, ConjugateGradientsReportNegativeCurvature) {
   const auto report = krylov.conjugate_gradients(turned, inverse, b, 1e-6, 100, x);
   EXPECT_TRUE(report.negative_curvature);
   EXPECT_FALSE(report.converged);
+}
+
+TEST_F(LinearSolversTest, ConjugateGradientsStopOnADescentWhereTheMatrixIsNotDefinite) {
+  CholeskySolver factor(sums->tangent);
+  ASSERT_TRUE(factor.factorise(sums->tangent, 5));
+  const auto inverse = [&](const Eigen::VectorXd& in, Eigen::VectorXd& out) { factor.solve(in, out); };
+  // One direction of negative curvature, which b has little of.
+  const Eigen::VectorXd v = testing::random_matrix(static_cast<int>(b.size()), 1, 6).normalized();
+  const double curvature = v.dot(sums->tangent * v);
+  const auto bent = [&](const Eigen::VectorXd& in, Eigen::VectorXd& out) {
+    out = sums->tangent * in - 1.5 * curvature * v.dot(in) * v;
+  };
+  Krylov krylov(b.size());
+  Eigen::VectorXd x, product(b.size());
+  const auto report = krylov.conjugate_gradients(bent, inverse, b, 1e-9, 500, x);
+  ASSERT_TRUE(report.negative_curvature);
+  ASSERT_GT(report.iterations, 0);
+  bent(x, product);
+  EXPECT_GT(b.dot(x), 0);
+  EXPECT_LT(0.5 * x.dot(product) - b.dot(x), 0);
+}
+
+TEST_F(LinearSolversTest, ConjugateGradientsGiveUpWhereTheyAreTooSlow) {
+  CholeskySolver factor(sums->tangent);
+  ASSERT_TRUE(factor.factorise(sums->tangent, 5));
+  const auto inverse = [&](const Eigen::VectorXd& in, Eigen::VectorXd& out) { factor.solve(in, out); };
+  const auto nothing = [](const Eigen::VectorXd& in, Eigen::VectorXd& out) { out = in; };
+  const auto matrix = [&](const Eigen::VectorXd& in, Eigen::VectorXd& out) { out = sums->tangent * in; };
+  Krylov krylov(b.size());
+  Eigen::VectorXd x;
+  const auto iterations = [&](const LinearMap& preconditioner, double tolerance, double worth) {
+    return krylov.conjugate_gradients(matrix, preconditioner, b, tolerance, 60, x, worth).iterations;
+  };
+  const double patient = std::numeric_limits<double>::infinity();
+  ASSERT_EQ(iterations(nothing, 1e-12, patient), 60);
+  EXPECT_LT(iterations(nothing, 1e-12, 1e-6), 20);
+  // What is fast enough is left to end.
+  const int enough = iterations(inverse, 1e-6, patient);
+  ASSERT_GT(enough, 6);
+  ASSERT_LT(enough, 60);
+  EXPECT_EQ(iterations(inverse, 1e-6, 0.1), enough);
 }
 
 }  // namespace
