@@ -190,5 +190,45 @@ class Driver(unittest.TestCase):
             self.assertTrue(new and all("case-003" in call for call in new), new)
 
 
+CASE = """[case]
+name = "case-001"
+
+[pose.prone]
+gravity = [0, -1, 0]
+
+[pose.supine]
+gravity = [0, 1, 0]
+surface = "supine.ply"
+
+[pose.tilt45]
+gravity = [0, 0.7, -0.7]
+surface = "tilt45.ply"
+
+[landmarks]
+prone = "prone_landmarks.csv"
+"""
+
+
+class WithoutTilt(unittest.TestCase):
+    def test_nothing_of_the_tilted_scan_is_left_and_nothing_else_is_lost(self):
+        with tempfile.TemporaryDirectory() as folder:
+            work = pathlib.Path(folder)
+            given = work / "cases" / "case-001"
+            given.mkdir(parents=True)
+            (given / "case.toml").write_text(CASE)
+            for name in ("supine.ply", "tilt45.ply", "tilt45_landmarks.csv", "prone_landmarks.csv", "labels.nrrd"):
+                (given / name).write_text(name)
+            case = hidden.without_tilt(work, "case-001")
+            self.assertEqual(sorted(file.name for file in case.iterdir()),
+                             ["case.toml", "labels.nrrd", "prone_landmarks.csv", "supine.ply"])
+            left = (case / "case.toml").read_text()
+            self.assertNotIn("tilt", left)
+            for kept in ("[case]", "[pose.prone]", "[pose.supine]", "supine.ply", "[landmarks]", "prone_landmarks.csv"):
+                self.assertIn(kept, left)
+            self.assertEqual((given / "case.toml").read_text(), CASE)
+            self.assertTrue((given / "tilt45.ply").exists())
+            self.assertEqual(hidden.without_tilt(work, "case-001"), case)  # a second call finds it made
+
+
 if __name__ == "__main__":
     unittest.main()
