@@ -154,7 +154,7 @@ bool EquilibriumSolver::search_line(Unknown unknown, const Points& known, Points
                                     const Eigen::VectorXd& step) {
   const bool use_energy = unknown == Unknown::deformed && mechanics_.has_energy();
   const double norm = sums_.residual.norm(), energy = sums_.energy, slope = sums_.residual.dot(step);
-  const Eigen::VectorXd residual = sums_.residual;
+  const Eigen::VectorXd residual = use_energy ? Eigen::VectorXd() : sums_.residual;
   std::optional<double> natural;  // of that residual
   const double least_det_f = largest_fall * std::min(sums_.min_det_f, 1.0);
   const bool last_digits = step.cwiseAbs().maxCoeff() < options_.step_tolerance_mm;

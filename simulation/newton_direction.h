@@ -50,7 +50,7 @@ class NewtonDirection {
   bool by_conjugate_gradients(double tolerance, double shift, int most, const Sums& sums, Eigen::VectorXd& step);
   bool by_gmres(const SparseMatrix& matrix, const LinearMap& preconditioner, double tolerance, const Sums& sums,
                 Eigen::VectorXd& step);
-  int worth_of_factor(int least, int most) const;
+  int worth_of_factor(int least, int most) const;  // Krylov iterations that cost as much as a new factor, cut at both
 
   const Mechanics& mechanics_;
   std::unique_ptr<SpdSolver> factor_;

@@ -16,8 +16,7 @@ std::vector<Eigen::Matrix3d> nodal_deformation(const Indices& cells, const Point
 
 /// A deformed shape for a body whose undeformed shape is a little different: x + F (X' - X), with F at the nodes. To
 /// first order det F stays what it was, where moving x as X was moved would compress nearly incompressible cells until
-/// their tangent is indefinite.
-/// A node with x = X is held there and moves as X does.
+/// their tangent is indefinite. A node with x = X is held there and moves as X does.
 /// @param cells  #C by 4 or 10, corners first
 /// @param x, X   deformed and undeformed nodes, #N by 3, mm
 /// @param moved  X', #N by 3, mm
