@@ -11,7 +11,7 @@
 #include <ctime>
 #include <iostream>
 
-#include "simulation/bulk.h"
+#include "simulation/terms/bulk.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"
 

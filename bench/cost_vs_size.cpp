@@ -12,9 +12,9 @@
 
 #include "bench/ellipsoid.h"
 #include "common/error.h"
-#include "simulation/bulk_laws.h"
-#include "simulation/equilibrium.h"
-#include "simulation/linear_solver.h"
+#include "simulation/laws/bulk_laws.h"
+#include "simulation/solve/equilibrium.h"
+#include "simulation/solve/linear_solver.h"
 
 namespace {
 

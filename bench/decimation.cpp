@@ -17,9 +17,9 @@
 #include <string>
 
 #include "common/error.h"
-#include "meshing/decimate_measure.h"
-#include "meshing/decimate_methods.h"
-#include "meshing/quad_remesh.h"
+#include "meshing/decimate/measure.h"
+#include "meshing/decimate/methods.h"
+#include "meshing/quads/quad_remesh.h"
 #include "reconstruction/surface_io.h"
 
 namespace {

@@ -2,7 +2,7 @@
 // Fast marching from one point of a box with speed 1 against the exact distance: error, time and memory, of both
 // orders, and of ITK's filter when it was there at configure time. Arguments: voxels along x, y, z (default 512 512
 // 200).
-#include "segmentation/fast_marching.h"
+#include "segmentation/fronts/fast_marching.h"
 
 #include <fmt/core.h>
 

@@ -12,8 +12,8 @@
 
 #include "bench/ellipsoid.h"
 #include "common/error.h"
-#include "simulation/bulk_laws.h"
-#include "simulation/chain.h"
+#include "simulation/laws/bulk_laws.h"
+#include "simulation/solve/chain.h"
 
 namespace {
 

@@ -16,8 +16,8 @@
 #include "calibration/uncertainty.h"
 #include "common/error.h"
 #include "meshing/mesh_io.h"
-#include "pipeline/case.h"
-#include "pipeline/model_file.h"
+#include "pipeline/case/case.h"
+#include "pipeline/case/model_file.h"
 #include "reconstruction/surface_io.h"
 
 namespace supine {

@@ -15,8 +15,8 @@
 #include <map>
 
 #include "common/error.h"
-#include "simulation/bulk_laws.h"
-#include "simulation/equilibrium.h"
+#include "simulation/laws/bulk_laws.h"
+#include "simulation/solve/equilibrium.h"
 #include "tests/simulation/scene.h"
 
 namespace {

@@ -17,8 +17,8 @@
 
 #include "bench/robustness_cases.h"
 #include "common/error.h"
-#include "simulation/bulk_laws.h"
-#include "simulation/linear_solver.h"
+#include "simulation/laws/bulk_laws.h"
+#include "simulation/solve/linear_solver.h"
 
 namespace {
 

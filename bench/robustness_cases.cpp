@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "simulation/bulk_laws.h"
+#include "simulation/laws/bulk_laws.h"
 #include "tests/support/shapes.h"
 
 namespace supine::bench {

@@ -17,7 +17,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "segmentation/labels_io.h"
+#include "segmentation/formats/labels_io.h"
 #include "segmentation/tissue.h"
 
 int main(int argc, char** argv) {

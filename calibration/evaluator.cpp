@@ -21,7 +21,7 @@ void leave_out(const std::vector<int>& points, PosePrediction& pose) {
         pose.to_scan.covered[i] = false;
 }
 
-std::vector<simulation::PoseLoad> loads_of(const Scene& scene) {
+std::vector<simulation::PoseLoad> loads_of(const MeasuredScene& scene) {
   std::vector<simulation::PoseLoad> loads = {scene.prone};
   for (const Measurement* measurement : scene.measurements) loads.push_back(measurement->pose);
   return loads;
@@ -49,7 +49,7 @@ std::vector<double> Prediction::scan_distances() const {
   return distances;
 }
 
-Evaluator::Evaluator(Scene scene, const simulation::Model& model, const simulation::SolveOptions& options)
+Evaluator::Evaluator(MeasuredScene scene, const simulation::Model& model, const simulation::SolveOptions& options)
     : scene_(std::move(scene)), chain_(*scene_.mesh, *scene_.anatomy, model, loads_of(scene_), options) {
   for (std::size_t m = 0; m < scene_.measurements.size(); ++m) skins_.emplace_back(*scene_.mesh, scene_.mesh->points);
 }

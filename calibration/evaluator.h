@@ -11,8 +11,8 @@
 #include "calibration/scan_motion.h"
 #include "calibration/signed_distance.h"
 #include "calibration/statistics.h"
-#include "simulation/chain.h"
-#include "simulation/sensitivities.h"
+#include "simulation/solve/chain.h"
+#include "simulation/solve/sensitivities.h"
 
 namespace supine::calibration {
 
@@ -25,7 +25,7 @@ struct Measurement {
 };
 
 /// What does not change while parameters do. Everything it points to must outlive its users.
-struct Scene {
+struct MeasuredScene {
   const meshing::TetMesh* mesh;
   const meshing::Anatomy* anatomy;
   simulation::PoseLoad prone;
@@ -39,7 +39,7 @@ struct PosePrediction {
   ModelToScan to_scan;        ///< of the skin's points to the scan
 };
 
-/// One model's prediction of everything measured, in the order of Scene::measurements.
+/// One model's prediction of everything measured, in the order of MeasuredScene::measurements.
 struct Prediction {
   simulation::ChainSolution solution;
   std::vector<PosePrediction> poses;
@@ -55,7 +55,7 @@ struct Prediction {
 class Evaluator {
  public:
   /// @param model  sets the kind of model (laws, boundaries); later ones may differ in numbers and effects
-  Evaluator(Scene scene, const simulation::Model& model, const simulation::SolveOptions& options = {});
+  Evaluator(MeasuredScene scene, const simulation::Model& model, const simulation::SolveOptions& options = {});
 
   /// @param near  solution to start from, or nullptr
   /// @throws NumericalFailure  no equilibrium
@@ -67,10 +67,10 @@ class Evaluator {
                                       const std::string& parameter, const simulation::ChainDerivative& derivative);
 
   simulation::Chain& chain() { return chain_; }
-  const Scene& scene() const { return scene_; }
+  const MeasuredScene& scene() const { return scene_; }
 
  private:
-  Scene scene_;
+  MeasuredScene scene_;
   simulation::Chain chain_;
   std::vector<ModelSkin> skins_;
 };

@@ -18,7 +18,7 @@ const simulation::SolveOptions brief{.max_iterations = 25, .smallest_load_step =
 
 }  // namespace
 
-EvaluatorPool::EvaluatorPool(const Scene& scene, const FreeParameters& parameters, simulation::ChainSolution reference,
+EvaluatorPool::EvaluatorPool(const MeasuredScene& scene, const FreeParameters& parameters, simulation::ChainSolution reference,
                              int threads)
     : parameters_(parameters), reference_(std::move(reference)) {
   for (int t = 0; t < std::max(1, threads); ++t)

@@ -52,7 +52,7 @@ Eigen::VectorXd drawn_start(const FreeParameters& parameters, std::mt19937& gene
 
 }  // namespace
 
-void FitOptions::check(const Scene& scene) const {
+void FitOptions::check(const MeasuredScene& scene) const {
   if (!(robust_mm > 0)) throw InputError(fmt::format("robust_mm = {}: must be > 0", robust_mm));
   if (max_iterations < 1) throw InputError(fmt::format("max_iterations = {}: must be > 0", max_iterations));
   if (starts < 1) throw InputError(fmt::format("starts = {}: must be > 0", starts));

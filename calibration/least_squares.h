@@ -26,7 +26,7 @@ struct FitOptions {
   const simulation::ChainSolution* near = nullptr;   ///< solution of the model's values, where it is known
   std::function<void(const FitProgress&)> progress;  ///< may be empty
 
-  void check(const Scene& scene) const;  ///< @throws InputError  naming the option, its value and the bound
+  void check(const MeasuredScene& scene) const;  ///< @throws InputError  naming the option, its value and the bound
 };
 
 /// One evaluation, for the history.

@@ -11,7 +11,7 @@ PointMask points_over_skin(const Prediction& prediction) {
   return mask;
 }
 
-Residuals residuals_of(const Scene& scene, const Prediction& prediction, const PointMask& mask,
+Residuals residuals_of(const MeasuredScene& scene, const Prediction& prediction, const PointMask& mask,
                        const std::vector<double>& noise_mm) {
   Eigen::Index count = 0;
   for (const auto& used : mask) count += used.count();

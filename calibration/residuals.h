@@ -20,14 +20,14 @@ struct Residuals {
   Eigen::VectorXd sigma_mm;     ///< #R, of the scanner along the normal
   Points place;                 ///< #R by 3, the scan points
   Table q;                      ///< #R by 2, anatomy coordinates (Anatomy::chart) of the closest skin point
-  Eigen::VectorXi pose;         ///< #R, row of Scene::measurements
+  Eigen::VectorXi pose;         ///< #R, row of MeasuredScene::measurements
   Eigen::VectorXi point;        ///< #R, row of its scan
 
   Eigen::Index size() const { return distance_mm.size(); }
 };
 
 /// @param noise_mm  per measurement
-Residuals residuals_of(const Scene& scene, const Prediction& prediction, const PointMask& mask,
+Residuals residuals_of(const MeasuredScene& scene, const Prediction& prediction, const PointMask& mask,
                        const std::vector<double>& noise_mm);
 
 /// Columns ∂d/∂u of the residuals with respect to the coordinates of some parameters, and how the shapes move.

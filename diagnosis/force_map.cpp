@@ -7,7 +7,7 @@
 #include <random>
 
 #include "common/error.h"
-#include "simulation/linear_solver.h"
+#include "simulation/solve/linear_solver.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -54,7 +54,7 @@ VectorXd node_areas(const calibration::ModelSkin& skin, const Points& x) {
 /// Moves of the nodes of one pose under unit bumps: solves with its tangent.
 class PoseTangent {
  public:
-  PoseTangent(const calibration::Scene& scene, const simulation::Model& model, const calibration::Fit& fit,
+  PoseTangent(const calibration::MeasuredScene& scene, const simulation::Model& model, const calibration::Fit& fit,
               std::size_t pose, simulation::Chain& chain)
       : mechanics_(*scene.mesh, *scene.anatomy, model), sums_(mechanics_.pattern()) {
     const auto& solution = fit.prediction.solution;
@@ -83,7 +83,7 @@ class PoseTangent {
 };
 
 /// ∂d/∂a of every bump and axis, #R by 3 #centres; a parameter that moves neither scan nor image lends its name.
-MatrixXd slopes(const calibration::Scene& scene, const simulation::Model& model, const calibration::Fit& fit,
+MatrixXd slopes(const calibration::MeasuredScene& scene, const simulation::Model& model, const calibration::Fit& fit,
                 const Points& centres, double width, std::size_t pose) {
   const std::string lender = "breast.young_modulus_kpa";
   calibration::Evaluator evaluator(scene, model);
@@ -150,7 +150,7 @@ double quantile95(std::vector<double> values) {
 
 }  // namespace
 
-ForceMap force_map(const calibration::Scene& scene, const simulation::Model& model, const WeightedFit& fit,
+ForceMap force_map(const calibration::MeasuredScene& scene, const simulation::Model& model, const WeightedFit& fit,
                    const Metric& metric, unsigned seed, int draws) {
   const calibration::Fit& f = fit.fit;
   const calibration::ModelSkin skin(*scene.mesh, f.prediction.solution.poses[0].x);

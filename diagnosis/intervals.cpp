@@ -25,7 +25,7 @@ struct Errors {
   Whitening whitening;
 };
 
-Errors errors_with(const calibration::Scene& scene, const ErrorSources& sources, const NumericalError* base,
+Errors errors_with(const calibration::MeasuredScene& scene, const ErrorSources& sources, const NumericalError* base,
                    const Tolerances& tolerances, const Refit& refit) {
   Errors errors{without_tolerance_for(refit.effect, sources), {}};
   if (base != nullptr) {
@@ -51,7 +51,7 @@ void widen(double sd, FittedParameter& p) {
 /// F above its least when one parameter, which has no prior, is held and the others are fitted again.
 class Profile {
  public:
-  Profile(const calibration::Scene& scene, const Metric& metric, const FreeParameters& parameters,
+  Profile(const calibration::MeasuredScene& scene, const Metric& metric, const FreeParameters& parameters,
           const WeightedFit& least, Eigen::Index which)
       : scene_(scene), metric_(metric), parameters_(parameters), least_(least), which_(which) {
     const Eigen::MatrixXd h = information(least, parameters, metric);
@@ -95,7 +95,7 @@ class Profile {
     return FreeParameters(std::move(model), std::move(rest));
   }
 
-  const calibration::Scene& scene_;
+  const calibration::MeasuredScene& scene_;
   const Metric& metric_;
   const FreeParameters& parameters_;
   const WeightedFit& least_;
@@ -121,7 +121,7 @@ double crossing(const Profile& profile, double reach, double farthest, double he
   return step;
 }
 
-FittedParameter profiled(const calibration::Scene& scene, const Metric& metric, const FreeParameters& parameters,
+FittedParameter profiled(const calibration::MeasuredScene& scene, const Metric& metric, const FreeParameters& parameters,
                          const WeightedFit& least, Eigen::Index i, const FittedParameter& linear) {
   const Profile profile(scene, metric, parameters, least, i);
   const double u = least.fit.u[i], height = level * std::max(1.0, misfit_of(least, parameters, metric));
@@ -140,7 +140,7 @@ FittedParameter profiled(const calibration::Scene& scene, const Metric& metric, 
 
 }  // namespace
 
-void settle(const calibration::Scene& scene, const ErrorSources& sources, const NumericalError* numerical,
+void settle(const calibration::MeasuredScene& scene, const ErrorSources& sources, const NumericalError* numerical,
             const Tolerances& tolerances, const Metric& metric, Refit& refit) {
   const Errors errors = errors_with(scene, sources, numerical, tolerances, refit);
   Metric now = metric;

@@ -15,7 +15,7 @@ namespace supine::diagnosis {
 /// parameters, and effects of several strengths, get linear_intervals().
 /// @param sources    of the base model's examination
 /// @param numerical  the mesh's error there; nullptr where it is not to be measured
-void settle(const calibration::Scene& scene, const ErrorSources& sources, const NumericalError* numerical,
+void settle(const calibration::MeasuredScene& scene, const ErrorSources& sources, const NumericalError* numerical,
             const Tolerances& tolerances, const Metric& metric, Refit& refit);
 
 }  // namespace supine::diagnosis

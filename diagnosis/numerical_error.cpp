@@ -11,7 +11,7 @@
 #include "diagnosis/other_mesh.h"
 #include "diagnosis/weighted_fit.h"
 #include "meshing/topology.h"
-#include "simulation/pushed_forward.h"
+#include "simulation/solve/pushed_forward.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -74,11 +74,11 @@ simulation::SolveOptions enough_from_near() {
 
 /// The model on another mesh.
 /// @param near  solution on @p mesh to start from, or nullptr
-calibration::Prediction predicted_on(const calibration::Scene& scene, const meshing::TetMesh& mesh,
+calibration::Prediction predicted_on(const calibration::MeasuredScene& scene, const meshing::TetMesh& mesh,
                                      const simulation::Model& model, const simulation::ChainSolution* near,
                                      const simulation::SolveOptions& options) {
   const meshing::Anatomy anatomy = meshing::compute_anatomy(mesh, scene.anatomy->side);
-  calibration::Scene other = scene;
+  calibration::MeasuredScene other = scene;
   other.mesh = &mesh;
   other.anatomy = &anatomy;
   calibration::Evaluator evaluator(other, model, options);
@@ -112,7 +112,7 @@ std::vector<Eigen::VectorXd> change_of_others(std::size_t first, const calibrati
 
 /// Fills finer_mm and what it comes from.
 /// @param near  or nullptr
-void measure_finer(const calibration::Scene& scene, const simulation::Model& model, const calibration::Fit& fit,
+void measure_finer(const calibration::MeasuredScene& scene, const simulation::Model& model, const calibration::Fit& fit,
                    const NumericalError* near, NumericalError& result) {
   if (scene.mesh->order() != 1) {
     const meshing::TetMesh mesh = other_mesh(*scene.mesh, *scene.anatomy, edge_share);
@@ -151,7 +151,7 @@ Eigen::VectorXd share_around(const Residuals& residuals, const Eigen::VectorXd& 
 }
 
 /// Fills what follows from the two changes. @throws NumericalFailure  neither mesh gave an answer
-void summarise(const calibration::Scene& scene, const Residuals& residuals, NumericalError& result) {
+void summarise(const calibration::MeasuredScene& scene, const Residuals& residuals, NumericalError& result) {
   const bool finer = result.finer_failure.empty(), coarser = result.coarser_failure.empty();
   if (!finer && !coarser)
     throw NumericalFailure("the error of the mesh cannot be measured: finer mesh: " + result.finer_failure +
@@ -192,7 +192,7 @@ double correlation_length_mm(const Residuals& residuals, const Eigen::VectorXd& 
   return std::clamp(-distance / count / std::log(correlation), shortest_mm, longest_mm);
 }
 
-NumericalError measure_numerical_error(const calibration::Scene& scene, const simulation::Model& model,
+NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, const simulation::Model& model,
                                        const calibration::Fit& fit, const NumericalError* near) {
   NumericalError result;
 #pragma omp parallel sections
@@ -215,7 +215,7 @@ NumericalError measure_numerical_error(const calibration::Scene& scene, const si
   return result;
 }
 
-std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& whole, const NumericalError& fitted) {
+std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::MeasuredScene& whole, const NumericalError& fitted) {
   const std::size_t count = fitted.finer.poses.size();
   if (count == 0 || whole.measurements.size() == count) return {};
   // They only confirm: a pose that does not come out in a few steps is left as it is.

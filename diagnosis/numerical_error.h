@@ -31,7 +31,7 @@ struct NumericalError {
 /// (other_mesh.h).
 /// @param near  of the same scene and a similar model, to start from; or nullptr
 /// @throws NumericalFailure  neither mesh gave an answer
-NumericalError measure_numerical_error(const calibration::Scene& scene, const simulation::Model& model,
+NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, const simulation::Model& model,
                                        const calibration::Fit& fit, const NumericalError* near = nullptr);
 
 /// Change of distance that finer elements make for every scan point of the measurements that are not fitted, in the
@@ -40,7 +40,7 @@ NumericalError measure_numerical_error(const calibration::Scene& scene, const si
 /// @param whole   the scene that @p fitted was measured in and, after its measurements, those that are not fitted
 /// @param fitted  what measure_numerical_error() found
 /// @return mm, #P of each scan that is not fitted
-std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::Scene& whole, const NumericalError& fitted);
+std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::MeasuredScene& whole, const NumericalError& fitted);
 
 /// Length l of exp(−r/l) that fits the correlation of neighbours in @p field, a change over the residuals' points with
 /// or without a mean; between 5 and 60 mm.

@@ -8,12 +8,12 @@
 #include <tuple>
 #include <vector>
 
-#include "meshing/curve.h"
-#include "meshing/decimate.h"
-#include "meshing/face_pieces.h"
-#include "meshing/grade.h"
-#include "meshing/ligament_ring.h"
-#include "meshing/tetrahedralise.h"
+#include "meshing/decimate/decimate.h"
+#include "meshing/tetrahedra/curve.h"
+#include "meshing/tetrahedra/face_pieces.h"
+#include "meshing/tetrahedra/grade.h"
+#include "meshing/tetrahedra/ligament_ring.h"
+#include "meshing/tetrahedra/tetrahedralise.h"
 #include "meshing/topology.h"
 
 namespace supine::diagnosis {

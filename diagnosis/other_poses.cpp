@@ -15,12 +15,12 @@ namespace {
 
 using calibration::FreeParameters;
 using calibration::Prediction;
-using calibration::Scene;
+using calibration::MeasuredScene;
 
 std::size_t fitted_poses(const WeightedFit& fit) { return fit.fit.prediction.solution.poses.size(); }
 
 /// The fit's solution, and the poses it lacks: as far from its undeformed shape as they were in @p base, or there.
-simulation::ChainSolution start_of(const Scene& whole, const WeightedFit& fit, const OtherPoses* base) {
+simulation::ChainSolution start_of(const MeasuredScene& whole, const WeightedFit& fit, const OtherPoses* base) {
   simulation::ChainSolution start = fit.fit.prediction.solution;
   for (std::size_t first = fitted_poses(fit), m = first; m < whole.measurements.size(); ++m) {
     Points x = start.X;
@@ -38,7 +38,7 @@ calibration::PointMask points_from(std::size_t first, const Prediction& predicti
 }
 
 /// Names the first pose from @p first on that has no point in the mask; empty where all have.
-std::string without_points(const Scene& whole, std::size_t first, const calibration::PointMask& mask) {
+std::string without_points(const MeasuredScene& whole, std::size_t first, const calibration::PointMask& mask) {
   for (std::size_t m = first; m < mask.size(); ++m)
     if (!mask[m].any())
       return "no point of the scan " + whole.measurements[m]->pose.name + " lies over the model's skin";
@@ -94,7 +94,7 @@ void add_noise(const calibration::Residuals& residuals, const Eigen::VectorXd& n
 void set_errors(calibration::Evaluator& evaluator, const FreeParameters& parameters, const WeightedFit& fit,
                 const ErrorSources& sources, const Metric& metric, const Tolerances& tolerances,
                 const Prediction& prediction, OtherPoses& others) {
-  const Scene& whole = evaluator.scene();
+  const MeasuredScene& whole = evaluator.scene();
   const simulation::Model model = parameters.model(fit.fit.u);
   std::vector<double> noise = metric.noise_mm;
   for (std::size_t m = noise.size(); m < whole.measurements.size(); ++m)
@@ -157,7 +157,7 @@ std::vector<double> OtherPoses::change_mm(const OtherPoses& other) const {
   return all;
 }
 
-OtherPoses other_poses_of_base(const Scene& whole, const FreeParameters& parameters, const WeightedFit& fit,
+OtherPoses other_poses_of_base(const MeasuredScene& whole, const FreeParameters& parameters, const WeightedFit& fit,
                                const ErrorSources& sources, const Metric& metric, const Tolerances& tolerances) {
   OtherPoses others;
   const simulation::Model model = parameters.model(fit.fit.u);
@@ -184,7 +184,7 @@ OtherPoses other_poses_of_base(const Scene& whole, const FreeParameters& paramet
   return others;
 }
 
-OtherPoses other_poses_of_refit(const Scene& whole, const FreeParameters& parameters, const WeightedFit& fit,
+OtherPoses other_poses_of_refit(const MeasuredScene& whole, const FreeParameters& parameters, const WeightedFit& fit,
                                 const ErrorSources& sources, const OtherPoses& base) {
   OtherPoses others;
   others.unfitted = base.unfitted;

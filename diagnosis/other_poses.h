@@ -38,12 +38,12 @@ struct OtherPoses {
 /// elsewhere the former judge nothing, because another scan lies elsewhere in its own way.
 /// @param whole   the fitted scene and, after its measurements, those that are not fitted
 /// @param metric  of the fit
-OtherPoses other_poses_of_base(const calibration::Scene& whole, const calibration::FreeParameters& parameters,
+OtherPoses other_poses_of_base(const calibration::MeasuredScene& whole, const calibration::FreeParameters& parameters,
                                const WeightedFit& fit, const ErrorSources& sources, const Metric& metric,
                                const Tolerances& tolerances);
 
 /// The same poses and points of a refit, starting from there. Nothing where one has no equilibrium.
-OtherPoses other_poses_of_refit(const calibration::Scene& whole, const calibration::FreeParameters& parameters,
+OtherPoses other_poses_of_refit(const calibration::MeasuredScene& whole, const calibration::FreeParameters& parameters,
                                 const WeightedFit& fit, const ErrorSources& sources, const OtherPoses& base);
 
 }  // namespace supine::diagnosis

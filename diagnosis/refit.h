@@ -44,8 +44,8 @@ simulation::EffectSetting free_setting(const std::string& effect);
 
 /// What all refits start from.
 struct RefitProblem {
-  calibration::Scene scene;        ///< fitted poses
-  calibration::Scene whole;        ///< and those that were not, after them
+  calibration::MeasuredScene scene;        ///< fitted poses
+  calibration::MeasuredScene whole;        ///< and those that were not, after them
   const simulation::Model* given;  ///< the base model as it was given: where its priors stand
   const simulation::Model* model;  ///< at its optimum
   const WeightedFit* base;

@@ -10,8 +10,8 @@
 #include <set>
 
 #include "common/error.h"
-#include "meshing/cleft.h"
-#include "meshing/foot.h"
+#include "meshing/anatomy/cleft.h"
+#include "meshing/anatomy/foot.h"
 #include "meshing/topology.h"
 #include "segmentation/tissue.h"
 

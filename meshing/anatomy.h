@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "meshing/muscle_distance.h"
+#include "meshing/anatomy/muscle_distance.h"
 #include "meshing/tet_mesh.h"
 
 namespace supine::meshing {

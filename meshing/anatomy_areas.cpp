@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "meshing/anatomy.h"
-#include "meshing/foot.h"
+#include "meshing/anatomy/foot.h"
 
 namespace supine::meshing {
 namespace {

@@ -3,7 +3,7 @@ execute_process(COMMAND git -C ${SOURCE} describe --always --abbrev=12 --dirty -
                 OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 file(CONFIGURE OUTPUT ${TARGET} CONTENT [[
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "pipeline/provenance.h"
+#include "pipeline/tool/provenance.h"
 
 namespace supine::pipeline {
 

@@ -20,7 +20,7 @@ foreach(command ${supine_commands} ${supine_plain_tools})
     install(TARGETS supine-${command} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   endif()
 endforeach()
-foreach(folder common segmentation reconstruction meshing simulation calibration diagnosis pipeline)
+foreach(folder common segmentation reconstruction meshing simulation calibration diagnosis phantom pipeline)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/supine FILES_MATCHING PATTERN *.h)
 endforeach()
 # Tools that know the catalogue are built again by a project that adds to it.

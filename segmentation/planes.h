@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "segmentation/chest_wall.h"
+#include "segmentation/chest/chest_wall.h"
 #include "segmentation/recipe.h"
 
 namespace supine::segmentation {

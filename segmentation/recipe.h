@@ -8,7 +8,7 @@
 #include <variant>
 #include <vector>
 
-#include "segmentation/chest_wall.h"
+#include "segmentation/chest/chest_wall.h"
 #include "segmentation/tissue.h"
 
 namespace supine::segmentation {

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "common/error.h"
-#include "segmentation/image_formats.h"
+#include "segmentation/formats/image_formats.h"
 
 namespace supine::segmentation {
 namespace {

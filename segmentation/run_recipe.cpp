@@ -9,7 +9,7 @@
 
 #include "common/error.h"
 #include "segmentation/body.h"
-#include "segmentation/fast_marching.h"
+#include "segmentation/fronts/fast_marching.h"
 #include "segmentation/grow.h"
 #include "segmentation/intensity.h"
 #include "segmentation/masks.h"

@@ -13,8 +13,8 @@
 #include <cmath>
 #include <vector>
 
-#include "simulation/elements.h"
-#include "simulation/term.h"
+#include "simulation/elements/elements.h"
+#include "simulation/terms/term.h"
 
 namespace supine::simulation {
 namespace {

@@ -9,10 +9,10 @@
 #include "common/error.h"
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
-#include "simulation/elements.h"
+#include "simulation/elements/elements.h"
+#include "simulation/elements/surface_geometry.h"
 #include "simulation/parameters.h"
 #include "simulation/skin_offset.h"
-#include "simulation/surface_geometry.h"
 
 namespace supine::simulation {
 

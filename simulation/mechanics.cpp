@@ -2,14 +2,14 @@
 #include "simulation/mechanics.h"
 
 #include "common/error.h"
-#include "simulation/bulk.h"
-#include "simulation/cut.h"
-#include "simulation/fibres.h"
-#include "simulation/gravity.h"
-#include "simulation/interface.h"
-#include "simulation/skin.h"
-#include "simulation/tet_geometry.h"
-#include "simulation/traction.h"
+#include "simulation/elements/tet_geometry.h"
+#include "simulation/terms/bulk.h"
+#include "simulation/terms/cut.h"
+#include "simulation/terms/fibres.h"
+#include "simulation/terms/gravity.h"
+#include "simulation/terms/interface.h"
+#include "simulation/terms/skin.h"
+#include "simulation/terms/traction.h"
 
 namespace supine::simulation {
 namespace {

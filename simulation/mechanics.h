@@ -6,7 +6,7 @@
 
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
-#include "simulation/term.h"
+#include "simulation/terms/term.h"
 
 namespace supine::simulation {
 

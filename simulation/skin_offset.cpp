@@ -7,10 +7,9 @@
 #include <vector>
 
 #include "common/error.h"
-#include "meshing/muscle_distance.h"
+#include "meshing/anatomy/muscle_distance.h"
 #include "meshing/tet_mesh.h"
-#include "simulation/elements.h"
-#include "simulation/term.h"
+#include "simulation/elements/elements.h"
 
 namespace supine::simulation {
 namespace {

@@ -8,11 +8,11 @@
 #include "calibration/error_map.h"
 #include "calibration/held_out.h"
 #include "common/error.h"
-#include "pipeline/calibration_report.h"
-#include "pipeline/journal_key.h"
-#include "pipeline/measured_case.h"
-#include "pipeline/model_edit.h"
-#include "pipeline/model_file.h"
+#include "pipeline/case/journal_key.h"
+#include "pipeline/case/measured_case.h"
+#include "pipeline/case/model_edit.h"
+#include "pipeline/case/model_file.h"
+#include "pipeline/results/calibration_report.h"
 #include "simulation/parameters.h"
 
 namespace supine::pipeline {
@@ -221,7 +221,7 @@ class CalibrateTool : public Tool {
     result.held_out_blocks = calibration::figures_of(as_list(calibration::held_out_distances(
         residuals, result.fit.linearisation.slope, priors, calibration::spatial_blocks(residuals))));
     if (measured_->held_out.empty()) return;
-    calibration::Scene scene = measured_->whole_scene();
+    calibration::MeasuredScene scene = measured_->whole_scene();
     scene.measurements.erase(scene.measurements.begin(),
                              scene.measurements.begin() + static_cast<std::ptrdiff_t>(measured_->fitted.size()));
     const simulation::Model model = parameters.model(result.fit.u);

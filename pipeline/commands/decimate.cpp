@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "meshing/decimate.h"
+#include "meshing/decimate/decimate.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <charconv>
 
 #include "common/error.h"
-#include "pipeline/tool.h"
+#include "pipeline/tool/tool.h"
 #include "reconstruction/surface_check.h"
 #include "reconstruction/surface_io.h"
 

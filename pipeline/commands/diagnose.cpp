@@ -4,9 +4,9 @@
 #include <algorithm>
 
 #include "common/error.h"
-#include "pipeline/diagnosis_report.h"
-#include "pipeline/ladder_report.h"
-#include "pipeline/picture.h"
+#include "pipeline/picture/picture.h"
+#include "pipeline/results/diagnosis_report.h"
+#include "pipeline/results/ladder_report.h"
 
 namespace supine::pipeline {
 namespace {

@@ -5,9 +5,9 @@
 
 #include "common/error.h"
 #include "common/outputs.h"
-#include "pipeline/model_edit.h"
-#include "pipeline/model_file.h"
-#include "pipeline/tool.h"
+#include "pipeline/case/model_edit.h"
+#include "pipeline/case/model_file.h"
+#include "pipeline/tool/tool.h"
 #include "simulation/catalogue.h"
 
 namespace supine::pipeline {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "pipeline/phantom/phantom.h"
+#include "phantom/phantom.h"
 
 #include <fmt/format.h>
 
 #include "common/error.h"
-#include "pipeline/tool.h"
+#include "pipeline/tool/tool.h"
 
 namespace supine::pipeline {
 namespace {

@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "common/error.h"
-#include "pipeline/tool.h"
+#include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
-#include "segmentation/labels_io.h"
+#include "segmentation/formats/labels_io.h"
 
 namespace supine::pipeline {
 namespace {

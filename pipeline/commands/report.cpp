@@ -4,13 +4,13 @@
 #include <fstream>
 
 #include "common/error.h"
-#include "pipeline/provenance.h"
 #include "pipeline/report/answer.h"
 #include "pipeline/report/collect.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/shapes.h"
 #include "pipeline/report/stages.h"
-#include "pipeline/tool.h"
+#include "pipeline/tool/provenance.h"
+#include "pipeline/tool/tool.h"
 
 namespace supine::pipeline {
 namespace {

@@ -7,9 +7,9 @@
 #include "calibration/evaluator_pool.h"
 #include "calibration/monte_carlo.h"
 #include "common/error.h"
-#include "pipeline/journal_key.h"
-#include "pipeline/measured_case.h"
-#include "pipeline/picture.h"
+#include "pipeline/case/journal_key.h"
+#include "pipeline/case/measured_case.h"
+#include "pipeline/picture/picture.h"
 
 namespace supine::pipeline {
 namespace {

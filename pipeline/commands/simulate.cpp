@@ -7,15 +7,15 @@
 #include "common/landmarks.h"
 #include "common/rms.h"
 #include "meshing/mesh_io.h"
-#include "pipeline/case.h"
-#include "pipeline/model_file.h"
-#include "pipeline/tool.h"
+#include "pipeline/case/case.h"
+#include "pipeline/case/model_file.h"
+#include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
-#include "simulation/bulk.h"
-#include "simulation/chain.h"
 #include "simulation/embedding.h"
 #include "simulation/export/exported_pose.h"
-#include "simulation/linear_solver.h"
+#include "simulation/solve/chain.h"
+#include "simulation/solve/linear_solver.h"
+#include "simulation/terms/bulk.h"
 
 namespace supine::pipeline {
 namespace {

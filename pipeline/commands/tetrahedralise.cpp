@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "meshing/tetrahedralise.h"
+#include "meshing/tetrahedra/tetrahedralise.h"
 
 #include <fmt/format.h>
 
@@ -8,19 +8,19 @@
 
 #include "common/error.h"
 #include "meshing/anatomy.h"
-#include "meshing/curve.h"
-#include "meshing/grade.h"
-#include "meshing/ligament_ring.h"
 #include "meshing/mesh_check.h"
 #include "meshing/mesh_io.h"
 #include "meshing/quality.h"
-#include "meshing/tissue_fractions.h"
+#include "meshing/tetrahedra/curve.h"
+#include "meshing/tetrahedra/grade.h"
+#include "meshing/tetrahedra/ligament_ring.h"
+#include "meshing/tetrahedra/tissue_fractions.h"
 #include "meshing/topology.h"
-#include "pipeline/mesh_report.h"
-#include "pipeline/picture.h"
-#include "pipeline/tool.h"
+#include "pipeline/picture/picture.h"
+#include "pipeline/results/mesh_report.h"
+#include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
-#include "segmentation/labels_io.h"
+#include "segmentation/formats/labels_io.h"
 
 namespace supine::pipeline {
 namespace {

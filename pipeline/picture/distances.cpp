@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "common/error.h"
-#include "pipeline/picture.h"
+#include "pipeline/picture/picture.h"
 #include "pipeline/picture/sheet.h"
 
 namespace supine::pipeline {

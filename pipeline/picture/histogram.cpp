@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/picture.h"
+#include "pipeline/picture/picture.h"
 #include "pipeline/picture/sheet.h"
 
 namespace supine::pipeline {

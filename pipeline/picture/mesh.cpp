@@ -12,7 +12,7 @@
 #include <vtkXMLUnstructuredGridReader.h>
 
 #include "common/error.h"
-#include "pipeline/picture.h"
+#include "pipeline/picture/picture.h"
 #include "pipeline/picture/sheet.h"
 
 namespace supine::pipeline {

@@ -22,7 +22,7 @@
 #include <cmath>
 
 #include "common/error.h"
-#include "pipeline/virtual_display.h"
+#include "pipeline/picture/virtual_display.h"
 
 VTK_MODULE_INIT(vtkRenderingOpenGL2);
 VTK_MODULE_INIT(vtkRenderingFreeType);

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "pipeline/case.h"
+#include "pipeline/case/case.h"
 
 namespace supine::pipeline {
 

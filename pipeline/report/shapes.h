@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/case.h"
-#include "pipeline/tool.h"
+#include "pipeline/case/case.h"
+#include "pipeline/tool/tool.h"
 
 namespace supine::pipeline {
 

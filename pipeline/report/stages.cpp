@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <map>
 
-#include "pipeline/hash.h"
+#include "pipeline/tool/hash.h"
 
 namespace supine::pipeline {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/case.h"
+#include "pipeline/case/case.h"
 #include "pipeline/report/collect.h"
 
 namespace supine::pipeline {

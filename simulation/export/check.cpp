@@ -4,9 +4,9 @@
 #include <algorithm>
 
 #include "common/error.h"
-#include "simulation/bulk_laws.h"
 #include "simulation/export/exported_pose.h"
 #include "simulation/fields.h"
+#include "simulation/laws/bulk_laws.h"
 
 namespace supine::simulation {
 namespace {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <map>
 
-#include "simulation/elements.h"
+#include "simulation/elements/elements.h"
+#include "simulation/elements/surface_geometry.h"
+#include "simulation/elements/tet_geometry.h"
 #include "simulation/fields.h"
-#include "simulation/surface_geometry.h"
-#include "simulation/tet_geometry.h"
 
 namespace supine::simulation {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
-#include "simulation/chain.h"
+#include "simulation/solve/chain.h"
 
 namespace supine::simulation {
 

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "simulation/assembly.h"
+#include "simulation/elements/assembly.h"
 
 namespace supine::simulation {
 

@@ -208,7 +208,7 @@ TEST(LeastSquares, SaysWhenNoStartHasAnEquilibrium) {
 
 TEST(LeastSquares, SaysThatNoPointOfTheScanLiesOverTheSkin) {
   const Twin beside({.truth = twin_truth(), .frame = Eigen::Isometry3d(Eigen::Translation3d(500, 0, 0))});
-  calibration::Scene scene = exact_twin().scene();
+  calibration::MeasuredScene scene = exact_twin().scene();
   scene.measurements = beside.scene().measurements;
   const FreeParameters parameters(twin_start());
   Evaluator evaluator(scene, twin_start());

@@ -29,7 +29,7 @@ struct Twin {
   simulation::PoseLoad prone, supine;
   simulation::ChainSolution solution;  ///< of the truth
   std::unique_ptr<calibration::Measurement> measurement;
-  calibration::Scene scene() const { return {&mesh, &anatomy, prone, {measurement.get()}}; }
+  calibration::MeasuredScene scene() const { return {&mesh, &anatomy, prone, {measurement.get()}}; }
 };
 
 /// Moduli that the tests take for true, both free around another start.

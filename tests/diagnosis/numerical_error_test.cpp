@@ -61,13 +61,13 @@ struct LinearOfQuadratic {
   }
 
   Twin twin;
-  calibration::Scene scene;
+  calibration::MeasuredScene scene;
   calibration::Fit fit;
 };
 
 TEST(NumericalError, QuadraticElementsTakeAwayWhatLinearOnesErr) {
   const LinearOfQuadratic f;
-  calibration::Scene whole = f.scene;
+  calibration::MeasuredScene whole = f.scene;
   whole.measurements.push_back(f.scene.measurements[0]);  // looked at as well, not fitted
   const NumericalError error = measure_numerical_error(f.scene, twin_truth(), f.fit);
   EXPECT_EQ(error.finer_failure + error.coarser_failure, "");
@@ -101,7 +101,7 @@ TEST(NumericalError, SaysWhyNeitherMeshGaveAnAnswer) {
   const Fitted f;
   meshing::TetMesh crossed = f.twin.mesh;  // its nipple pulled through its muscle: no surface to fill anew
   crossed.points.row(f.twin.anatomy.nipple_point) -= 200 * f.twin.anatomy.outward.transpose();
-  calibration::Scene scene = f.twin.scene();
+  calibration::MeasuredScene scene = f.twin.scene();
   scene.mesh = &crossed;
   try {
     measure_numerical_error(scene, twin_truth(), f.fit);

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "meshing/curve.h"
-#include "meshing/grade.h"
 #include "meshing/jacobian.h"
+#include "meshing/tetrahedra/curve.h"
+#include "meshing/tetrahedra/grade.h"
 #include "meshing/topology.h"
 #include "tests/support/shapes.h"
 

@@ -59,7 +59,7 @@ class Scans {
  private:
   Twin first_;
   std::vector<std::unique_ptr<Twin>> looked_at_;
-  calibration::Scene whole_;
+  calibration::MeasuredScene whole_;
   calibration::Residuals residuals_;
   Metric metric_;
 };

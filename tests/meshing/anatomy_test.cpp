@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "common/error.h"
-#include "meshing/ligament_ring.h"
+#include "meshing/tetrahedra/ligament_ring.h"
 #include "meshing/topology.h"
 #include "tests/support/shapes.h"
 

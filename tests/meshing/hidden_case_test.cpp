@@ -10,7 +10,7 @@
 
 #include "meshing/anatomy.h"
 #include "reconstruction/reconstruct.h"
-#include "segmentation/image_io.h"
+#include "segmentation/formats/image_io.h"
 #include "segmentation/label_map.h"
 
 namespace supine {

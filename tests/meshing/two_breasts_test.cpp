@@ -8,8 +8,8 @@
 
 #include "common/error.h"
 #include "meshing/anatomy.h"
-#include "meshing/cleft.h"
-#include "meshing/ligament_ring.h"
+#include "meshing/anatomy/cleft.h"
+#include "meshing/tetrahedra/ligament_ring.h"
 #include "tests/support/shapes.h"
 
 namespace supine::meshing {

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "pipeline/model_file.h"
+#include "pipeline/case/model_file.h"
 #include "tests/pipeline/process.h"
 #include "tests/pipeline/small_case.h"
 #include "tests/pipeline/small_run.h"

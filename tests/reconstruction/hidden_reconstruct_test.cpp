@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <map>
 
-#include "meshing/decimate.h"
+#include "meshing/decimate/decimate.h"
 #include "reconstruction/reconstruct.h"
-#include "segmentation/image_io.h"
+#include "segmentation/formats/image_io.h"
 #include "segmentation/label_map.h"
 
 namespace supine::reconstruction {

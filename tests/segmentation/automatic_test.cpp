@@ -7,13 +7,13 @@
 #include <cstdlib>
 #include <random>
 
-#include "segmentation/image_io.h"
+#include "segmentation/chest/leaks.h"
+#include "segmentation/chest/sampler.h"
+#include "segmentation/formats/image_io.h"
 #include "segmentation/label_map.h"
-#include "segmentation/leaks.h"
 #include "segmentation/recipe_toml.h"
 #include "segmentation/run_recipe.h"
-#include "segmentation/sampler.h"
-#include "tests/segmentation/image_files.h"
+#include "tests/segmentation/formats/image_files.h"
 
 namespace supine::segmentation {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "tests/segmentation/image_files.h"
+#include "tests/segmentation/formats/image_files.h"
 
 namespace supine::segmentation {
 namespace {

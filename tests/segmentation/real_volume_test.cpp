@@ -4,7 +4,7 @@
 
 #include <cstdlib>
 
-#include "segmentation/image_io.h"
+#include "segmentation/formats/image_io.h"
 #include "segmentation/label_map.h"
 #include "segmentation/recipe_toml.h"
 #include "segmentation/run_recipe.h"

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/segmentation/image_files.h"
+#include "tests/segmentation/formats/image_files.h"
 
 namespace supine::segmentation {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "tests/segmentation/image_files.h"
+#include "tests/segmentation/formats/image_files.h"
 
 namespace supine::segmentation {
 namespace {

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "tests/segmentation/dicom_files.h"
+#include "tests/segmentation/formats/dicom_files.h"
 #include "tests/segmentation/segment_fixture.h"
 
 // What the executable says about a DICOM series that contradicts the case, and about recipes that leave nothing.

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <string>
 
-#include "tests/segmentation/image_files.h"
+#include "tests/segmentation/formats/image_files.h"
 
 namespace supine::segmentation::testing {
 

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "segmentation/labels_io.h"
+#include "segmentation/formats/labels_io.h"
 #include "segmentation/tissue.h"
 #include "tests/segmentation/segment_fixture.h"
 

@@ -9,8 +9,8 @@
 
 #include <cmath>
 
-#include "simulation/equilibrium.h"
-#include "simulation/linear_solver.h"
+#include "simulation/solve/equilibrium.h"
+#include "simulation/solve/linear_solver.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/shapes.h"
 

@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "common/error.h"
-#include "simulation/bulk.h"
-#include "simulation/equilibrium.h"
+#include "simulation/solve/equilibrium.h"
+#include "simulation/terms/bulk.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "simulation/bulk_laws.h"
-#include "simulation/linear_solver.h"
+#include "simulation/laws/bulk_laws.h"
 #include "simulation/mechanics.h"
+#include "simulation/solve/linear_solver.h"
 #include "tests/simulation/manufactured_problem.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"

@@ -3,8 +3,8 @@
 
 #include <Eigen/Geometry>
 
-#include "simulation/bulk_laws.h"
-#include "simulation/chain.h"
+#include "simulation/laws/bulk_laws.h"
+#include "simulation/solve/chain.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/shapes.h"
 #include "tests/support/taylor.h"

@@ -5,10 +5,10 @@
 #include <Eigen/SparseLU>
 #include <cmath>
 
-#include "simulation/bulk_laws.h"
-#include "simulation/elements.h"
-#include "simulation/equilibrium.h"
-#include "simulation/tet_geometry.h"
+#include "simulation/elements/elements.h"
+#include "simulation/elements/tet_geometry.h"
+#include "simulation/laws/bulk_laws.h"
+#include "simulation/solve/equilibrium.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"
 

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "common/toml_reader.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <numeric>
+#include <sstream>
+
+#include "common/error.h"
+
+namespace supine {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Edits between two words: letters inserted, left out, replaced, or two neighbours swapped
+/// (Levenshtein's distance with transpositions, Damerau 1964, in its restricted form).
+int edit_distance(std::string_view a, std::string_view b) {
+  std::vector<int> before(b.size() + 1), previous(b.size() + 1), row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    before.swap(previous);
+    previous.swap(row);
+    row[0] = static_cast<int>(i);
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({previous[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1), previous[j] + 1, row[j - 1] + 1});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+  }
+  return row.back();
+}
+
+std::string printed(const toml::node& node) {
+  if (const auto text = node.value_exact<std::string>()) return fmt::format("\"{}\"", *text);
+  if (const auto number = node.value_exact<double>()) return fmt::format("{}", *number);
+  std::ostringstream text;
+  if (const toml::array* array = node.as_array()) {
+    for (const toml::node& element : *array) text << (text.tellp() > 0 ? ", " : "") << printed(element);
+    return "[" + text.str() + "]";
+  }
+  node.visit([&text](const auto& value) { text << toml::toml_formatter(value); });
+  return text.str();
+}
+
+/// Elements of an array through @p convert, which returns nothing for a wrong type.
+template <class T, class Convert>
+std::vector<T> elements(const TomlReader& reader, std::string_view key, const char* what, Convert convert) {
+  const toml::array* array = reader.table().get(key)->as_array();
+  if (!array) reader.fail(key, fmt::format("must be a list of {} in square brackets", what));
+  std::vector<T> values;
+  for (const toml::node& element : *array) {
+    const std::optional<T> value = convert(element);
+    if (!value) reader.fail(key, fmt::format("must hold {} only", what));
+    values.push_back(*value);
+  }
+  return values;
+}
+
+std::optional<double> finite_number(const toml::node& node) {
+  if (!node.is_number()) return {};
+  const double number = *node.value<double>();
+  return std::isfinite(number) ? std::optional(number) : std::nullopt;
+}
+
+std::optional<int> small_integer(const toml::node& node) {
+  if (!node.is_integer()) return {};
+  const std::int64_t number = **node.as_integer();
+  if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max()) return {};
+  return static_cast<int>(number);
+}
+
+}  // namespace
+
+std::string nearest_name(std::string_view name, const std::vector<std::string>& known) {
+  std::string nearest;
+  int smallest = std::max<int>(1, static_cast<int>(name.size()) / 3) + 1;
+  for (const std::string& candidate : known) {
+    const int distance = edit_distance(name, candidate);
+    if (distance >= smallest) continue;
+    smallest = distance;
+    nearest = candidate;
+  }
+  return nearest;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) text += i + 1 == names.size() ? " or " : ", ";
+    text += names[i];
+  }
+  return text;
+}
+
+toml::table parse_toml(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || fs::is_directory(file)) throw InputError(fmt::format("cannot read {}", file.string()));
+  std::ostringstream text;
+  text << stream.rdbuf();
+  try {
+    return toml::parse(text.str(), file.string());
+  } catch (const toml::parse_error& error) {
+    throw InputError(fmt::format("{}:{}:{}: not valid TOML: {}", file.string(), error.source().begin.line,
+                                 error.source().begin.column, error.description()));
+  }
+}
+
+TomlReader::TomlReader(const toml::table& table, fs::path file, std::string section)
+    : table_(&table), file_(std::move(file)), section_(std::move(section)) {}
+
+void TomlReader::fail(std::string_view key, const std::string& complaint) const {
+  const toml::node* node = table_->get(key);
+  const auto line = (node ? node->source() : table_->source()).begin.line;
+  std::string place = file_.string();
+  if (line > 0) place += fmt::format(":{}", line);
+  place += ":";
+  if (!section_.empty()) place += fmt::format(" [{}]", section_);
+  if (node && !node->is_table() && !node->is_array_of_tables())
+    throw InputError(fmt::format("{} {} = {}: {}", place, key, printed(*node), complaint));
+  throw InputError(fmt::format("{} {}: {}", place, key, complaint));
+}
+
+void TomlReader::allow(const std::vector<std::string>& known) const {
+  for (const auto& [key, node] : *table_) {
+    if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
+    const std::string nearest = nearest_name(key.str(), known);
+    fail(key.str(), nearest.empty() ? fmt::format("unknown key; known here: {}", listed(known))
+                                    : fmt::format("unknown key; did you mean {}?", nearest));
+  }
+}
+
+std::optional<std::string> TomlReader::text(std::string_view key) const {
+  if (!has(key)) return {};
+  const auto value = table_->get(key)->value_exact<std::string>();
+  if (!value) fail(key, "must be a text in quotes");
+  if (value->empty()) fail(key, "must not be empty");
+  return value;
+}
+
+std::optional<double> TomlReader::number(std::string_view key) const {
+  if (!has(key)) return {};
+  const auto value = finite_number(*table_->get(key));
+  if (!value) fail(key, "must be a finite number");
+  return value;
+}
+
+std::optional<std::vector<std::string>> TomlReader::texts(std::string_view key) const {
+  if (!has(key)) return {};
+  return elements<std::string>(*this, key, "texts in quotes",
+                               [](const toml::node& node) { return node.value_exact<std::string>(); });
+}
+
+std::optional<std::vector<double>> TomlReader::numbers(std::string_view key) const {
+  if (!has(key)) return {};
+  return elements<double>(*this, key, "finite numbers", finite_number);
+}
+
+std::optional<std::vector<int>> TomlReader::integers(std::string_view key) const {
+  if (!has(key)) return {};
+  return elements<int>(*this, key, "whole numbers", small_integer);
+}
+
+std::optional<TomlReader> TomlReader::sub_table(std::string_view key) const {
+  if (!has(key)) return {};
+  const toml::table* inner = table_->get(key)->as_table();
+  const std::string name = section_.empty() ? std::string(key) : fmt::format("{}.{}", section_, key);
+  if (!inner) fail(key, fmt::format("must be a table: write [{}] on a line of its own", name));
+  return TomlReader(*inner, file_, name);
+}
+
+std::string TomlReader::required_text(std::string_view key) const {
+  if (!has(key)) fail(key, "is missing and must be given");
+  return *text(key);
+}
+
+std::string TomlReader::choice(std::string_view key, const std::vector<std::string>& values,
+                               const std::string& otherwise) const {
+  const std::string value = text(key).value_or(otherwise);
+  if (std::find(values.begin(), values.end(), value) == values.end()) {
+    const std::string nearest = nearest_name(value, values);
+    fail(key, fmt::format("must be {}{}", listed(values), nearest.empty() ? "" : "; did you mean " + nearest + "?"));
+  }
+  return value;
+}
+
+}  // namespace supine

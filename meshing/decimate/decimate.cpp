@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "meshing/decimate/decimate.h"
+
+#include <fmt/core.h>
+
+#include <vector>
+
+#include "common/error.h"
+#include "meshing/decimate/methods.h"
+#include "meshing/surface/sound_surface.h"
+
+namespace supine::meshing {
+namespace {
+
+using reconstruction::Surface;
+
+constexpr double smallest_relative = 0.05, largest_relative = 20;
+
+bool coarse_enough(const DecimateMeasure& measure, const DecimateOptions& options) {
+  if (options.edge_mm > 0) return false;
+  const Eigen::Index most = options.target_faces > 0 ? options.target_faces : options.target_triangles;
+  return measure.report().triangles <= most;
+}
+
+DecimateResult unchanged(const DecimateMeasure& measure, bool reached, std::string reason) {
+  DecimateResult result;
+  result.surface = measure.input();
+  result.reached_target = reached;
+  result.reason = std::move(reason);
+  measure.measure_shape(result);
+  return result;
+}
+
+std::string too_many(const DecimateResult& result, const DecimateOptions& options) {
+  return fmt::format(
+      "{} triangles are needed to stay within {} mm of the input; allow more triangles or a larger distance",
+      result.surface.triangles.rows(), options.max_distance_mm);
+}
+
+// Points that no triangle uses would be measured as if they were surface. @return whether there were any
+bool drop_unused_points(const Surface& in, const DecimateOptions& options, Surface& compact, DecimateOptions& fitting) {
+  std::vector<int> number(in.points.rows(), -1), kept;
+  for (Eigen::Index i = 0; i < in.triangles.size(); ++i) number[in.triangles.data()[i]] = 0;
+  for (int p = 0; p < static_cast<int>(number.size()); ++p)
+    if (number[p] == 0) {
+      number[p] = static_cast<int>(kept.size());
+      kept.push_back(p);
+    }
+  if (kept.size() == number.size()) return false;
+  compact = in;
+  compact.points = Points(in.points(kept, Eigen::all));
+  for (Eigen::Index i = 0; i < in.triangles.size(); ++i) compact.triangles.data()[i] = number[in.triangles.data()[i]];
+  fitting = options;
+  if (options.relative_size.size() > 0) fitting.relative_size = Eigen::VectorXd(options.relative_size(kept));
+  return true;
+}
+
+}  // namespace
+
+void DecimateOptions::check() const {
+  if (target_triangles < 100)
+    throw InputError(fmt::format("the number of triangles is {}; it must be at least 100", target_triangles));
+  if (!(max_distance_mm > 0))
+    throw InputError(fmt::format("the distance bound is {} mm; it must be > 0", max_distance_mm));
+  if (target_faces != 0 && target_faces < 50)
+    throw InputError(fmt::format("the number of faces is {}; it must be 0 or at least 50", target_faces));
+  if (!(edge_mm >= 0)) throw InputError(fmt::format("the edge length is {} mm; it must be > 0", edge_mm));
+  for (Eigen::Index p = 0; p < relative_size.size(); ++p)
+    if (!(relative_size(p) >= smallest_relative && relative_size(p) <= largest_relative))
+      throw InputError(fmt::format("the relative size of point {} is {}; it must lie in [{}, {}]", p, relative_size(p),
+                                   smallest_relative, largest_relative));
+}
+
+DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
+  options.check();
+  SoundSurface sound = require_sound(in, options.open ? Borders::allowed : Borders::closed, "the surface to decimate");
+  if (options.relative_size.size() != 0 && options.relative_size.size() != in.points.rows())
+    throw InputError(fmt::format("there are {} relative sizes for {} points of the surface; one each is needed",
+                                 options.relative_size.size(), in.points.rows()));
+  Surface compact;
+  DecimateOptions fitting;
+  if (drop_unused_points(in, options, compact, fitting)) return decimate(compact, fitting);
+  const DecimateMeasure measure(in, std::move(sound));
+  if (coarse_enough(measure, options)) return unchanged(measure, true, "");
+  DecimateResult result;
+  std::string fallback;
+  if (options.method == DecimateMethod::quads) {
+    result = decimate_to_quads(measure, options);
+    if (result.surface.triangles.rows() == 0) fallback = "no sound quads within the bound: " + result.reason;
+  }
+  if (result.surface.triangles.rows() == 0) result = decimate_to_triangles(measure, options);
+  if (result.surface.triangles.rows() == 0)
+    result = unchanged(measure, false,
+                       "no coarser surface stays within the bound without crossing itself (" + result.reason +
+                           "); the input is returned");
+  else if (!result.reached_target)
+    result.reason = too_many(result, options);
+  result.fallback = fallback;
+  measure.measure_shape(result);
+  return result;
+}
+
+}  // namespace supine::meshing

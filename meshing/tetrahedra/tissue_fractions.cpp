@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "meshing/tetrahedra/tissue_fractions.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "common/error.h"
+#include "meshing/topology.h"
+#include "segmentation/tissue.h"
+
+namespace supine::meshing {
+namespace {
+
+using segmentation::Grid;
+using segmentation::LabelImage;
+using segmentation::Tissue;
+
+constexpr int divisions = 7;    // of a tetrahedron's edges: 84 points
+constexpr int near_voxels = 3;  // the surface stays this close to the voxels it came from
+constexpr int far_voxels = 10;
+constexpr double most_outside = 0.05;
+constexpr int none = -1;
+
+bool meshed(int tissue) { return segmentation::is_meshed(static_cast<Tissue>(tissue)); }
+
+// Barycentric coordinates of the points, all of the same weight.
+std::vector<Eigen::RowVector4d> sample_points() {
+  std::vector<Eigen::RowVector4d> points;
+  for (int i = 0; i < divisions; ++i) {
+    for (int j = 0; i + j < divisions; ++j) {
+      for (int k = 0; i + j + k < divisions; ++k) {
+        const int l = divisions - 1 - i - j - k;
+        points.push_back((Eigen::RowVector4d(i, j, k, l).array() + 0.25) / divisions);
+      }
+    }
+  }
+  return points;
+}
+
+// Voxel steps within `radius` voxels (of the finest axis), nearest first in mm.
+std::vector<Eigen::Vector3i> steps_by_distance(const Grid& grid, int radius) {
+  const double reach_mm = radius * grid.spacing_mm.minCoeff();
+  const Eigen::Vector3i n = (reach_mm / grid.spacing_mm.array()).ceil().cast<int>();
+  std::vector<Eigen::Vector3i> steps;
+  for (int k = -n.z(); k <= n.z(); ++k) {
+    for (int j = -n.y(); j <= n.y(); ++j) {
+      for (int i = -n.x(); i <= n.x(); ++i) steps.emplace_back(i, j, k);
+    }
+  }
+  const auto distance = [&](const Eigen::Vector3i& s) {
+    return s.cast<double>().cwiseProduct(grid.spacing_mm).squaredNorm();
+  };
+  std::stable_sort(steps.begin(), steps.end(), [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+  return steps;
+}
+
+class TissueAt {
+ public:
+  explicit TissueAt(const LabelImage& labels)
+      : labels_(labels),
+        near_(steps_by_distance(labels.grid, near_voxels)),
+        far_(steps_by_distance(labels.grid, far_voxels)) {}
+
+  int near(const Eigen::Vector3d& p) const { return search(p, near_); }
+  int far(const Eigen::Vector3d& p) const { return search(p, far_); }
+
+ private:
+  int search(const Eigen::Vector3d& p, const std::vector<Eigen::Vector3i>& steps) const {
+    const Eigen::Vector3d index = labels_.grid.continuous_index(p);
+    if (!(index.array().abs() < 1e6).all()) return none;
+    const Eigen::Vector3i home = index.array().round().cast<int>();
+    for (const Eigen::Vector3i& step : steps) {
+      const Eigen::Vector3i v = home + step;
+      if (!labels_.grid.contains(v.x(), v.y(), v.z())) continue;
+      const int tissue = labels_.at(v.x(), v.y(), v.z());
+      if (meshed(tissue)) return tissue;
+    }
+    return none;
+  }
+
+  const LabelImage& labels_;
+  std::vector<Eigen::Vector3i> near_, far_;
+};
+
+void check_fit(const TetMesh& mesh, const std::vector<double>& outside, FractionReport& report) {
+  double volume = 0, missed = 0;
+  Eigen::RowVector3d place = Eigen::RowVector3d::Zero();
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
+    const double v = cell_volume_mm3(mesh.points, mesh.cells, c);
+    volume += v;
+    missed += v * outside[c];
+    place += v * outside[c] * mesh.points.row(mesh.cells(c, 0));
+  }
+  report.outside_share = missed / volume;
+  if (report.outside_share <= most_outside) return;
+  place /= missed;
+  throw InputError(fmt::format(
+      "{:.1f} % of the mesh's volume (around ({:.1f}, {:.1f}, {:.1f}) mm) lies where the labels have no tissue "
+      "that is meshed; at most {:.0f} % may: are surface and labels of the same case and in the same frame?",
+      100 * report.outside_share, place.x(), place.y(), place.z(), 100 * most_outside));
+}
+
+}  // namespace
+
+FractionReport assign_tissue(TetMesh& mesh, const LabelImage& labels) {
+  const TissueAt tissue_at(labels);
+  const std::vector<Eigen::RowVector4d> samples = sample_points();
+  const Eigen::Index count = mesh.cells.rows();
+  mesh.fraction = Table::Zero(count, segmentation::tissue_count);
+  mesh.tissue.resize(count);
+  std::vector<double> outside(count, 0.0);
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index c = 0; c < count; ++c) {
+    Eigen::Matrix<double, 4, 3> corners;
+    for (int k = 0; k < 4; ++k) corners.row(k) = mesh.points.row(mesh.cells(c, k));
+    std::array<int, segmentation::tissue_count> hits{};
+    int all = 0;
+    for (const Eigen::RowVector4d& sample : samples) {
+      const int tissue = tissue_at.near((sample * corners).transpose());
+      if (tissue == none) continue;
+      ++hits[tissue];
+      ++all;
+    }
+    outside[c] = 1 - static_cast<double>(all) / static_cast<double>(samples.size());
+    if (all == 0) {
+      const int tissue = tissue_at.far(corners.colwise().mean().transpose());
+      hits[tissue == none ? static_cast<int>(Tissue::adipose) : tissue] = all = 1;
+    }
+    for (int t = 0; t < segmentation::tissue_count; ++t) mesh.fraction(c, t) = static_cast<double>(hits[t]) / all;
+    mesh.tissue[c] = static_cast<int>(std::max_element(hits.begin(), hits.end()) - hits.begin());
+  }
+  FractionReport report;
+  check_fit(mesh, outside, report);
+  report.voxel_ml = Eigen::VectorXd::Zero(segmentation::tissue_count);
+  for (const std::uint8_t tissue : labels.voxels) {
+    if (meshed(tissue)) report.voxel_ml[tissue] += labels.grid.voxel_volume_mm3() / 1000;
+  }
+  return report;
+}
+
+}  // namespace supine::meshing

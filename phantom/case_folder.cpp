@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "phantom/case_folder.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <fstream>
+
+#include "common/error.h"
+
+namespace supine::phantom {
+namespace {
+
+namespace fs = std::filesystem;
+
+void write_text(const std::string& text, const fs::path& target, Outputs& outputs) {
+  const fs::path temporary = outputs.stage(target);
+  std::ofstream stream(temporary, std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) throw InputError("writing " + target.string() + " failed; check the free space on the disk");
+}
+
+std::string number_list(const Eigen::Vector3d& v) { return fmt::format("{:.6f}, {:.6f}, {:.6f}", v.x(), v.y(), v.z()); }
+
+std::string case_text(const std::string& name, const CaseContents& contents) {
+  std::string text = fmt::format(R"([case]
+name = "{}"
+frame = "LPS"
+side = "{}"
+
+[image]
+file = "labels.nrrd"
+kind = "labels"
+cut = ["excluded"]
+[image.labels]
+air = [0]
+adipose = [1]
+gland = [2]
+muscle = [3]
+skin = [4]
+excluded = [5]
+tumour = [6]
+
+[landmarks]
+prone = "prone_landmarks.csv"
+
+[pose.prone]
+gravity = [{}]
+)",
+                                 name, contents.side, number_list(contents.prone_gravity));
+  for (const MeasuredPose& pose : contents.poses)
+    text += fmt::format(R"(
+[pose.{0}]
+gravity = [{1}]
+surface = "{0}.ply"
+noise_mm = {2}
+landmarks = "{0}_landmarks.csv"
+)",
+                        pose.name, number_list(pose.gravity), contents.noise_mm);
+  return text;
+}
+
+constexpr const char* model_text = R"([breast]
+law = "neo_hookean"
+young_modulus_kpa = { value = 0.5, prior_sd = 0.4, lower = 0.05, upper = 5 }
+poisson_ratio = 0.45
+density_kg_m3 = 1000
+density_refers_to = "undeformed"
+[skin]
+law = "neo_hookean"
+young_modulus_kpa = { value = 20, prior_sd = 20, lower = 0.5, upper = 300 }
+thickness_mm = 1.5
+compression = "tension_field"
+compression_share = 0.05
+[interface]
+kind = "sliding"
+normal_kpa_per_mm = 3.0
+tangential_kpa_per_mm = 0.01
+[cut]
+kind = "elastic"
+stiffness_kpa_per_mm = 1.0
+)";
+
+// One gzip member without name or time.
+std::string gzipped(const std::vector<std::uint8_t>& bytes) {
+  z_stream stream{};
+  constexpr int gzip_window = 15 + 16;
+  if (deflateInit2(&stream, 6, Z_DEFLATED, gzip_window, 8, Z_DEFAULT_STRATEGY) != Z_OK)
+    throw InputError("zlib could not be started: not enough memory");
+  std::string packed(deflateBound(&stream, bytes.size()), '\0');
+  stream.next_in = const_cast<Bytef*>(bytes.data());
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+std::string nrrd_text(const segmentation::LabelImage& labels) {
+  const segmentation::Grid& grid = labels.grid;
+  const Eigen::Vector3d& step = grid.spacing_mm;
+  return fmt::format(
+             "NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\n"
+             "space directions: ({},0,0) (0,{},0) (0,0,{})\nkinds: domain domain domain\nendian: little\n"
+             "encoding: gzip\nspace origin: ({},{},{})\n\n",
+             grid.size.x(), grid.size.y(), grid.size.z(), step.x(), step.y(), step.z(), grid.origin_mm.x(),
+             grid.origin_mm.y(), grid.origin_mm.z()) +
+         gzipped(labels.voxels);
+}
+
+std::string ply_text(const reconstruction::Surface& surface) {
+  std::string text = fmt::format(
+      "ply\nformat ascii 1.0\ncomment frame LPS, unit mm\nelement vertex {}\nproperty float x\nproperty float y\n"
+      "property float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+      surface.points.rows(), surface.triangles.rows());
+  for (Eigen::Index i = 0; i < surface.points.rows(); ++i)
+    text += fmt::format("{:.3f} {:.3f} {:.3f}\n", surface.points(i, 0), surface.points(i, 1), surface.points(i, 2));
+  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t)
+    text += fmt::format("3 {} {} {}\n", surface.triangles(t, 0), surface.triangles(t, 1), surface.triangles(t, 2));
+  return text;
+}
+
+}  // namespace
+
+void write_case_folder(const fs::path& folder, const CaseContents& contents, Outputs& outputs) {
+  const std::string name = fs::absolute(folder).lexically_normal().filename().string();
+  write_text(case_text(name, contents), folder / "case.toml", outputs);
+  write_text(model_text, folder / "model.toml", outputs);
+  write_text(nrrd_text(contents.labels), folder / "labels.nrrd", outputs);
+  write_landmarks(contents.prone_landmarks, outputs.stage(folder / "prone_landmarks.csv"));
+  for (const MeasuredPose& pose : contents.poses) {
+    write_text(ply_text(pose.scan.surface), folder / (pose.name + ".ply"), outputs);
+    write_landmarks(pose.scan.landmarks, outputs.stage(folder / (pose.name + "_landmarks.csv")));
+  }
+}
+
+}  // namespace supine::phantom

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/landmarks.h"
+#include "common/outputs.h"
+#include "phantom/scan.h"
+#include "segmentation/image.h"
+
+namespace supine::phantom {
+
+struct MeasuredPose {
+  std::string name;
+  Eigen::Vector3d gravity;
+  Scan scan;
+};
+
+/// All that a case folder tells.
+struct CaseContents {
+  std::string side;
+  double noise_mm = 0.7;
+  segmentation::LabelImage labels;  ///< values of Label
+  Landmarks prone_landmarks;
+  Eigen::Vector3d prone_gravity;
+  std::vector<MeasuredPose> poses;
+};
+
+/// Writes case.toml, model.toml (the generic base model to start from), labels.nrrd, the scans and landmarks.
+/// Bytes depend on the contents and the folder's name alone: no time, no provenance.
+/// @throws InputError  what Outputs says
+void write_case_folder(const std::filesystem::path& folder, const CaseContents& contents, Outputs& outputs);
+
+}  // namespace supine::phantom

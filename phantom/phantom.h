@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "phantom/case_folder.h"
+#include "phantom/truth.h"
+
+namespace supine::phantom {
+
+struct PhantomOptions {
+  std::uint64_t seed = 1;
+  std::vector<std::string> effects;  ///< of the catalogue; at most two causes in all
+  std::vector<std::string> outside;  ///< of outside_causes()
+  bool tilt = false;                 ///< a scan of the body tilted by 45° as well
+  double noise_mm = 0.7;             ///< in [0, 5]
+  double voxel_mm = 1.5;             ///< in [0.5, 4]
+  int rings = 11;                    ///< of the mesh, in [4, 30]
+  int order = 2;                     ///< 1 or 2
+  void check() const;                ///< @throws InputError naming option, value and bound
+};
+
+/// What the case folder tells, and what it does not.
+struct Phantom {
+  CaseContents contents;
+  Body body;  ///< with the moduli that were used
+  std::vector<Cause> causes;
+  int nodes = 0, tetrahedra = 0;
+  double volume_ml = 0;
+  std::vector<TruthPose> poses;  ///< of the truth's nodes
+  Points rest;                   ///< stress-free, mm
+};
+
+/// Body, noise and holes depend on the seed alone, so that two phantoms of one seed differ by their causes only.
+/// Where the drawn moduli carry no equilibrium they are raised by 15 % up to six times.
+/// @throws InputError        options; an unknown cause, a cause given twice, more than two
+/// @throws NumericalFailure  no equilibrium even then
+Phantom make_phantom(const PhantomOptions& options);
+
+}  // namespace supine::phantom

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/case/case.h"
+
+#include <fmt/core.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "common/error.h"
+#include "common/toml_reader.h"
+#include "pipeline/case/case_image.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double unit_tolerance = 1e-3;  // of a gravity vector's length
+constexpr double same_direction_rad = 1e-3;
+
+/// Names of files that tools write; a pose of that name would overwrite them.
+const std::vector<std::string> reserved_names = {
+    "undeformed", "mesh",        "labels", "breast",  "muscle", "gland",     "tumour",      "coarse", "comparison",
+    "scan",       "calibration", "model",  "history", "ladder", "diagnosis", "sensitivity", "report"};
+
+Eigen::Vector3d read_gravity(const TomlReader& pose, const std::string& frame) {
+  const auto g = pose.numbers("gravity");
+  if (!g) pose.fail("gravity", "is missing: give the direction in which things fall, as three numbers of length 1");
+  if (g->size() != 3) pose.fail("gravity", fmt::format("must be three numbers, not {}", g->size()));
+  const Eigen::Vector3d vector(g->at(0), g->at(1), g->at(2));
+  const double length = vector.norm();
+  if (length == 0) pose.fail("gravity", "is zero; give the direction in which things fall, of length 1");
+  if (std::abs(length - 1) > unit_tolerance) {
+    const Eigen::Vector3d unit = vector / length;
+    pose.fail(
+        "gravity",
+        fmt::format("is a direction and must have length 1 (within {}), not {:.6g}; write [{:.6f}, {:.6f}, {:.6f}]",
+                    unit_tolerance, length, unit.x(), unit.y(), unit.z()));
+  }
+  const Eigen::Vector3d lps = frame == "RAS" ? Eigen::Vector3d(-vector.x(), -vector.y(), vector.z()) : vector;
+  return lps / length;
+}
+
+Pose read_pose(const TomlReader& reader, const std::string& name, const std::string& frame) {
+  reader.allow({"gravity", "surface", "noise_mm", "landmarks"});
+  Pose pose;
+  pose.name = name;
+  pose.gravity = read_gravity(reader, frame);
+  if (reader.has("surface")) pose.surface = case_path(reader, "surface", false);
+  if (reader.has("landmarks")) pose.landmarks = case_path(reader, "landmarks", false);
+  pose.noise_mm = reader.number("noise_mm");
+  if (pose.noise_mm && *pose.noise_mm <= 0)
+    reader.fail("noise_mm", "must be > 0 mm; leave the key out when the noise is not known");
+  return pose;
+}
+
+void check_pose_name(const TomlReader& poses, const std::string& name) {
+  const bool plain = std::all_of(name.begin(), name.end(),
+                                 [](unsigned char c) { return (c < 128 && std::isalnum(c)) || c == '_' || c == '-'; });
+  if (!plain || name.empty()) poses.fail(name, "a pose names files: use letters, digits, _ and - only");
+  if (std::find(reserved_names.begin(), reserved_names.end(), name) != reserved_names.end())
+    poses.fail(name, "this name belongs to a file the tools write; give the pose another");
+}
+
+void check_directions_differ(const TomlReader& poses, const std::vector<Pose>& all) {
+  for (std::size_t i = 0; i < all.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const Eigen::Vector3d &a = all[i].gravity, &b = all[j].gravity;
+      if (std::atan2(a.cross(b).norm(), a.dot(b)) >= same_direction_rad) continue;
+      poses.sub_table(all[i].name)
+          ->fail("gravity",
+                 fmt::format("is the same direction as in [pose.{}] (within {} rad); a second pose needs another load",
+                             all[j].name, same_direction_rad));
+    }
+}
+
+/// prone and supine first, the others as they stand in the file.
+std::vector<std::string> pose_order(const TomlReader& poses) {
+  std::vector<std::pair<toml::source_position, std::string>> others;
+  for (const auto& [key, node] : poses.table())
+    if (key != "prone" && key != "supine") others.emplace_back(key.source().begin, std::string(key.str()));
+  std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.first.line, a.first.column) < std::pair(b.first.line, b.first.column);
+  });
+  std::vector<std::string> names = {"prone", "supine"};
+  for (auto& [position, name] : others) names.push_back(std::move(name));
+  return names;
+}
+
+void read_poses(const TomlReader& file, Case& result) {
+  const auto poses = file.sub_table("pose");
+  if (!poses) file.fail("pose", "tables [pose.prone] and [pose.supine] are missing: they say how things fall");
+  for (const std::string& name : pose_order(*poses)) {
+    const auto pose = poses->sub_table(name);
+    if (!pose) poses->fail(name, fmt::format("table [pose.{}] is missing", name));
+    check_pose_name(*poses, name);
+    result.poses.push_back(read_pose(*pose, name, result.frame));
+  }
+  check_directions_differ(*poses, result.poses);
+}
+
+void read_landmark_table(const TomlReader& file, Case& result) {
+  if (const auto landmarks = file.sub_table("landmarks")) {
+    landmarks->allow({"prone"});
+    if (landmarks->has("prone")) result.prone_landmarks = case_path(*landmarks, "prone", false);
+  }
+  if (result.prone_landmarks) return;
+  for (const Pose& pose : result.poses)
+    if (pose.landmarks)
+      file.sub_table("pose")->sub_table(pose.name)->fail(
+          "landmarks", "needs the prone position of the same points: add [landmarks] with prone = \"FILE.csv\"");
+}
+
+void read_calibration(const TomlReader& file, Case& result) {
+  const auto calibration = file.sub_table("calibration");
+  if (!calibration) return;
+  calibration->allow({"poses"});
+  const auto names = calibration->texts("poses");
+  if (!names) return;
+  if (names->empty()) calibration->fail("poses", "lists no pose; leave the key out to fit supine");
+  for (auto name = names->begin(); name != names->end(); ++name) {
+    const auto pose =
+        std::find_if(result.poses.begin(), result.poses.end(), [&](const Pose& p) { return p.name == *name; });
+    if (pose == result.poses.end()) calibration->fail("poses", fmt::format("there is no [pose.{}]", *name));
+    if (!pose->surface) calibration->fail("poses", fmt::format("[pose.{}] has no surface to fit", *name));
+    if (std::find(names->begin(), name, *name) != name)
+      calibration->fail("poses", fmt::format("\"{}\" is listed twice", *name));
+  }
+  result.calibrated_poses = *names;
+}
+
+void read_head(const TomlReader& file, Case& result) {
+  const auto head = file.sub_table("case");
+  if (!head) file.fail("case", "table [case] is missing: it says name, frame and side");
+  head->allow({"name", "frame", "side"});
+  result.name = head->required_text("name");
+  result.frame = head->choice("frame", {"LPS", "RAS"}, "LPS");
+  head->required_text("side");
+  result.side = head->choice("side", {"left", "right", "both"}, "");
+}
+
+}  // namespace
+
+const Pose& Case::pose(std::string_view wanted) const {
+  std::vector<std::string> names;
+  for (const Pose& pose : poses) {
+    if (pose.name == wanted) return pose;
+    names.push_back(pose.name);
+  }
+  throw InputError(fmt::format("case {} has no pose {}; it has {}", name, wanted, listed(names)));
+}
+
+Case read_case(const fs::path& folder) {
+  if (!fs::exists(folder)) throw InputError(fmt::format("case folder {} is not there", folder.string()));
+  if (!fs::is_directory(folder))
+    throw InputError(fmt::format("{} is not a folder; name the folder that holds case.toml", folder.string()));
+  const fs::path path = folder / "case.toml";
+  if (!fs::exists(path))
+    throw InputError(
+        fmt::format("{} is not there; a case is a folder with a case.toml (docs/case-file.md)", path.string()));
+  const toml::table table = parse_toml(path);
+  const TomlReader file(table, path, "");
+  file.allow({"case", "image", "segmentation", "pose", "landmarks", "calibration"});
+  Case result;
+  result.folder = folder;
+  read_head(file, result);
+  read_case_image(file, result);
+  read_poses(file, result);
+  read_landmark_table(file, result);
+  read_calibration(file, result);
+  return result;
+}
+
+}  // namespace supine::pipeline

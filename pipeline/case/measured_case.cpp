@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/case/measured_case.h"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <mutex>
+
+#include "calibration/noise.h"
+#include "calibration/residuals.h"
+#include "calibration/signed_distance.h"
+#include "common/error.h"
+#include "meshing/mesh_io.h"
+#include "pipeline/case/model_file.h"
+#include "reconstruction/surface_io.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using calibration::Measurement;
+
+bool is_fitted(const Case& c, const std::string& pose) {
+  return std::find(c.calibrated_poses.begin(), c.calibrated_poses.end(), pose) != c.calibrated_poses.end();
+}
+
+/// Fitted poses first, then the other measured ones.
+std::vector<Pose> measured_poses(const Case& c) {
+  std::vector<Pose> poses;
+  for (const std::string& name : c.calibrated_poses) {
+    const Pose& pose = c.pose(name);
+    if (!pose.surface)
+      throw InputError(fmt::format(
+          "{}: pose '{}' is to be fitted ([calibration] poses) and has no surface; name the measured surface as "
+          "`surface` in [pose.{}]",
+          (c.folder / "case.toml").string(), name, name));
+    poses.push_back(pose);
+  }
+  for (const Pose& pose : c.poses)
+    if (pose.surface && pose.name != "prone" && !is_fitted(c, pose.name)) poses.push_back(pose);
+  return poses;
+}
+
+void solve_start(MeasuredCase& in, const std::vector<Pose>& poses) {
+  std::vector<simulation::PoseLoad> loads = {{"prone", in.description.pose("prone").gravity}};
+  for (const Pose& pose : poses) loads.push_back({pose.name, pose.gravity});
+  simulation::Chain chain(in.mesh, in.anatomy, in.model, loads);
+  for (std::size_t p = 1; p < loads.size(); ++p)
+    simulation::check_effects_act(in.model, {in.mesh, in.anatomy, chain.mechanics().layout(), loads[p].name});
+  in.start = chain.solve(in.model);
+}
+
+/// Points of the scan that stand out of their neighbours as no noise does: dirt, hair, a marker, a crossing ray.
+std::vector<int> outliers(Run& run, const calibration::Scan& scan, const calibration::ModelSkin& skin,
+                          double given_noise_mm, const std::string& name) {
+  constexpr double worth_a_warning = 0.001;
+  constexpr double least_noise_mm = 0.25;  // a smoothed scan has none, and then every crease would stand out
+  calibration::SignedDistances distances;
+  calibration::scan_to_model(skin, scan.points(), distances);
+  std::vector<int> over;
+  for (int i = 0; i < scan.points().rows(); ++i)
+    if (!distances.closest.on_border[i]) over.push_back(i);
+  if (static_cast<int>(over.size()) < calibration::Scan::least_points) return {};
+  const Points place = scan.points()(over, Eigen::all);
+  const Eigen::VectorXd distance_mm = distances.distance_mm(over);
+  const double noise_mm =
+      std::max({calibration::estimate_noise_mm(place, distance_mm), given_noise_mm, least_noise_mm});
+  std::vector<int> points;
+  for (const int row : calibration::points_that_stand_out(place, distance_mm, noise_mm))
+    points.push_back(over[static_cast<std::size_t>(row)]);
+  const double share = static_cast<double>(points.size()) / static_cast<double>(over.size());
+  if (share > worth_a_warning)
+    run.warn(
+        fmt::format("{}: {} of {} points over the breast ({:.1f} %) stand out of their neighbours by more than "
+                    "four times the noise ({:.2f} mm), the first at ({:.1f}, {:.1f}, {:.1f}) mm; they are left out",
+                    name, points.size(), over.size(), 100 * share, noise_mm, scan.points()(points.front(), 0),
+                    scan.points()(points.front(), 1), scan.points()(points.front(), 2)));
+  return points;
+}
+
+void read_scan(Run& run, MeasuredCase& in, const Pose& pose, std::size_t row) {
+  const std::string name = pose.surface->string();
+  const auto surface = reconstruction::read_surface(run.input(*pose.surface), in.description.frame);
+  const calibration::ModelSkin skin(in.mesh, in.start.poses[row].x);
+  calibration::Scan scan(surface, skin, name);
+  calibration::check_placement(scan, skin, in.mesh.muscle, name);
+  auto& list = is_fitted(in.description, pose.name) ? in.fitted : in.held_out;
+  std::vector<int> left_out = outliers(run, scan, skin, pose.noise_mm.value_or(0), name);
+  list.push_back(Measurement{{pose.name, pose.gravity}, std::move(scan), pose.noise_mm, std::move(left_out)});
+}
+
+calibration::MeasuredScene scene_of(const MeasuredCase& in, bool whole) {
+  calibration::MeasuredScene scene{&in.mesh, &in.anatomy, {"prone", in.description.pose("prone").gravity}, {}};
+  for (const Measurement& m : in.fitted) scene.measurements.push_back(&m);
+  for (const Measurement& m : in.held_out)
+    if (whole) scene.measurements.push_back(&m);
+  return scene;
+}
+
+}  // namespace
+
+calibration::MeasuredScene MeasuredCase::fitted_scene() const { return scene_of(*this, false); }
+
+calibration::MeasuredScene MeasuredCase::whole_scene() const { return scene_of(*this, true); }
+
+std::vector<double> MeasuredCase::noise_mm(calibration::Evaluator& evaluator) const {
+  std::vector<double> noise;
+  const std::vector<double> placeholder(fitted.size(), 1.0);
+  calibration::Prediction prediction;
+  for (std::size_t m = 0; m < fitted.size(); ++m) {
+    if (fitted[m].noise_mm) {
+      noise.push_back(*fitted[m].noise_mm);
+      continue;
+    }
+    if (prediction.poses.empty()) prediction = evaluator.predict(model, &start);
+    auto mask = calibration::points_over_skin(prediction);
+    for (std::size_t other = 0; other < mask.size(); ++other)
+      if (other != m) mask[other].setConstant(false);
+    const auto residuals = calibration::residuals_of(evaluator.scene(), prediction, mask, placeholder);
+    noise.push_back(calibration::estimate_noise_mm(residuals.place, residuals.distance_mm));
+  }
+  return noise;
+}
+
+std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const fs::path& folder, const fs::path& mesh_file,
+                                                 const fs::path& model_file) {
+  auto in = std::make_unique<MeasuredCase>();
+  run.input(folder / "case.toml");
+  in->description = read_case(folder);
+  in->model_file = model_file.empty() ? folder / "model.toml" : model_file;
+  in->model = read_model(run.input(in->model_file));
+  in->mesh = meshing::read_mesh(run.input(mesh_file));
+  in->anatomy = meshing::compute_anatomy(in->mesh, in->description.side);
+  const std::vector<Pose> poses = measured_poses(in->description);
+  solve_start(*in, poses);
+  for (std::size_t p = 0; p < poses.size(); ++p) read_scan(run, *in, poses[p], p);
+  return in;
+}
+
+struct LiveProgress::State {
+  const Run& run;
+  std::chrono::seconds pause;
+  std::mutex mutex;
+  bool terminal = isatty(STDERR_FILENO) != 0;
+  std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
+};
+
+LiveProgress::LiveProgress(const Run& run, std::chrono::seconds pause) : state_(new State{run, pause, {}}) {}
+LiveProgress::~LiveProgress() = default;
+
+void LiveProgress::show(const std::string& line) {
+  const std::lock_guard lock(state_->mutex);
+  if (state_->terminal) return state_->run.progress(line);
+  const auto now = std::chrono::steady_clock::now();
+  if (now - state_->last < state_->pause) return;
+  state_->last = now;
+  state_->run.say("  " + line);
+}
+
+}  // namespace supine::pipeline

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "calibration/evaluator.h"
+#include "meshing/anatomy.h"
+#include "meshing/tet_mesh.h"
+#include "pipeline/case/case.h"
+#include "pipeline/tool/tool.h"
+#include "simulation/model.h"
+
+namespace supine::pipeline {
+
+/// A case with its mesh, a model and every measured surface, ready for distances: what calibration, sensitivity and
+/// diagnosis start from.
+struct MeasuredCase {
+  Case description;
+  std::filesystem::path model_file;
+  simulation::Model model;
+  meshing::TetMesh mesh;
+  meshing::Anatomy anatomy;
+  std::vector<calibration::Measurement> fitted;    ///< in the order of [calibration] poses
+  std::vector<calibration::Measurement> held_out;  ///< every other measured pose
+  simulation::ChainSolution start;                 ///< of the model as given; poses: fitted, then held out
+
+  /// Only what is fitted, or all of it.
+  calibration::MeasuredScene fitted_scene() const;
+  calibration::MeasuredScene whole_scene() const;
+  /// Of each fitted measurement: as the case says, or estimated from the distances to the given model.
+  /// @param evaluator  of fitted_scene()
+  std::vector<double> noise_mm(calibration::Evaluator& evaluator) const;
+};
+
+/// Reads and checks all of it, and solves the model as given once, because only a predicted skin tells which side of a
+/// scan is outside and whether it lies at the body.
+/// @throws InputError  a fitted pose without a surface; no interface; side = "both" without two breasts; a scan that is
+/// not at the body;
+///   effects that can change nothing
+/// @throws NumericalFailure  no equilibrium with the model as given
+std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const std::filesystem::path& folder,
+                                                 const std::filesystem::path& mesh_file,
+                                                 const std::filesystem::path& model_file);
+
+/// Progress of long work: one line that overwrites itself on a terminal, a line of its own where standard error is a
+/// file or a pipe. Threads may call it at the same time.
+class LiveProgress {
+ public:
+  /// @param pause  least time between two lines in a file or a pipe; none where each line begins work of its own
+  explicit LiveProgress(const Run& run, std::chrono::seconds pause = std::chrono::seconds(5));
+  ~LiveProgress();
+  void show(const std::string& line);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace supine::pipeline

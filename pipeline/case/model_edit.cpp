@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/case/model_edit.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <string_view>
+#include <vector>
+
+#include "common/error.h"
+#include "common/toml_reader.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using simulation::Effect;
+using simulation::Parameter;
+
+std::string read_text(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || fs::is_directory(file)) throw InputError(fmt::format("cannot read {}", file.string()));
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+std::vector<std::string> split_lines(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+const Effect& known_effect(const std::string& name) {
+  if (const Effect* effect = simulation::find_effect(name)) return *effect;
+  std::vector<std::string> names;
+  for (const Effect* effect : simulation::catalogue()) names.push_back(effect->name());
+  const std::string nearest = nearest_name(name, names);
+  throw InputError(fmt::format("there is no effect \"{}\"; {}", name,
+                               nearest.empty() ? "there are " + listed(names) : "did you mean " + nearest + "?"));
+}
+
+/// First line (0-based) of the block of the effect, or -1.
+int effect_line(const fs::path& file, const std::string& name) {
+  const toml::table table = parse_toml(file);
+  const toml::array* entries = table.get_as<toml::array>("effect");
+  if (!entries) return -1;
+  for (const toml::node& entry : *entries) {
+    const toml::table* effect = entry.as_table();
+    if (effect && (*effect)["name"].value_or(std::string_view()) == name)
+      return static_cast<int>(effect->source().begin.line) - 1;
+  }
+  return -1;
+}
+
+bool starts_table(const std::string& line) {
+  const auto first = line.find_first_not_of(" \t");
+  return first != std::string::npos && line[first] == '[';
+}
+
+bool is_comment_or_blank(const std::string& line) {
+  const auto first = line.find_first_not_of(" \t\r");
+  return first == std::string::npos || line[first] == '#';
+}
+
+/// One past the last line of the block that starts at @p begin.
+std::size_t block_end(const std::vector<std::string>& lines, std::size_t begin) {
+  std::size_t end = begin + 1;
+  while (end < lines.size() && !starts_table(lines[end])) ++end;
+  if (end == lines.size()) return end;
+  while (end > begin + 1 && is_comment_or_blank(lines[end - 1])) --end;
+  return end;
+}
+
+/// Everything free within its range and about its usual value, as the diagnosis refits the effect: a strength found
+/// with another place than the file has would be another strength.
+std::string parameter_line(const Parameter& row) {
+  const std::string comment = fmt::format("# {}{}", row.meaning, row.unit == "1" ? "" : ", " + row.unit);
+  return fmt::format("{} = {{ value = {}, prior_sd = {:.3g}, lower = {}, upper = {} }}  {}\n", row.name, row.median,
+                     simulation::prior_sd(row), row.lower, row.upper, comment);
+}
+
+/// The table that holds the section of a parameter: "breast" of the file, or the [[effect]] of that name.
+const toml::table* section_of(const toml::table& file, const std::string& section) {
+  if (const toml::table* base = file.get_as<toml::table>(section)) return base;
+  const toml::array* entries = file.get_as<toml::array>("effect");
+  for (std::size_t i = 0; entries && i < entries->size(); ++i) {
+    const toml::table* effect = entries->get_as<toml::table>(i);
+    if (effect && (*effect)["name"].value_or(std::string_view()) == section) return effect;
+  }
+  return nullptr;
+}
+
+/// Where the number of a free parameter stands in the file.
+toml::source_region value_place(const toml::table& table, const fs::path& file, const std::string& name) {
+  const auto dot = name.find('.');
+  const toml::table* section = section_of(table, name.substr(0, dot));
+  const toml::table* entry = section ? section->get_as<toml::table>(name.substr(dot + 1)) : nullptr;
+  const toml::node* value = entry ? entry->get("value") : nullptr;
+  if (value == nullptr)
+    throw InputError(fmt::format("{} does not hold {} as a table {{ value = ... }}, so its value cannot be replaced",
+                                 file.string(), name));
+  return value->source();
+}
+
+/// Byte at which the code point @p column (1-based) of a line starts.
+std::size_t byte_of(const std::string& line, std::size_t column) {
+  std::size_t byte = 0;
+  for (std::size_t point = 1; point < column && byte < line.size(); ++point) {
+    ++byte;
+    while (byte < line.size() && (static_cast<unsigned char>(line[byte]) & 0xC0) == 0x80) ++byte;
+  }
+  return byte;
+}
+
+}  // namespace
+
+std::string effect_block(const Effect& effect) {
+  std::string block = fmt::format("[[effect]]  # {}\nname = \"{}\"\n", effect.meaning(), effect.name());
+  for (const Parameter& row : effect.parameters()) block += parameter_line(row);
+  for (const auto& option : effect.options())
+    block += fmt::format("{} = \"{}\"  # {}: {}\n", option.name, option.default_value, listed(option.values),
+                         option.meaning);
+  return block;
+}
+
+std::string with_effect(const fs::path& file, const std::string& name) {
+  const Effect& effect = known_effect(name);
+  if (const int line = effect_line(file, name); line >= 0)
+    throw InputError(fmt::format("{}:{}: the effect {} is there already; change its values, or remove it first",
+                                 file.string(), line + 1, name));
+  std::string text = read_text(file);
+  if (!text.empty() && text.back() != '\n') text += '\n';
+  return text + effect_block(effect);
+}
+
+std::string without_effect(const fs::path& file, const std::string& name) {
+  const int line = effect_line(file, name);
+  if (line < 0) throw InputError(fmt::format("{} has no effect \"{}\" to remove", file.string(), name));
+  const std::vector<std::string> lines = split_lines(read_text(file));
+  const auto begin = static_cast<std::size_t>(line);
+  const std::size_t end = block_end(lines, begin);
+  std::string text;
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    if (i < begin || i >= end) text += lines[i] + "\n";
+  return text;
+}
+
+std::string with_values(const fs::path& file, const std::map<std::string, double>& values) {
+  const toml::table table = parse_toml(file);
+  std::vector<std::pair<toml::source_region, double>> places;
+  for (const auto& [name, value] : values) places.emplace_back(value_place(table, file, name), value);
+  // From the end of the file to its beginning, so that places further up stay where they are.
+  std::sort(places.begin(), places.end(), [](const auto& a, const auto& b) {
+    const auto &p = a.first.begin, &q = b.first.begin;
+    return p.line != q.line ? p.line > q.line : p.column > q.column;
+  });
+  const std::string text = read_text(file);
+  std::vector<std::string> lines = split_lines(text);
+  for (const auto& [place, value] : places) {
+    std::string& line = lines[place.begin.line - 1];
+    const std::size_t begin = byte_of(line, place.begin.column), end = byte_of(line, place.end.column);
+    line.replace(begin, end - begin, fmt::format("{}", value));
+  }
+  std::string edited;
+  for (const std::string& line : lines) edited += line + "\n";
+  return edited;
+}
+
+}  // namespace supine::pipeline

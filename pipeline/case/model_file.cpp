@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/case/model_file.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <set>
+
+#include "common/error.h"
+#include "common/toml_reader.h"
+#include "simulation/catalogue.h"
+#include "simulation/laws/bulk_laws.h"
+#include "simulation/parameters.h"
+
+namespace supine::pipeline {
+namespace {
+
+using simulation::Model;
+using simulation::Parameter;
+using simulation::Setting;
+
+std::string with_unit(double value, const Parameter& row) {
+  return row.unit.empty() || row.unit == "1" ? fmt::format("{}", value) : fmt::format("{} {}", value, row.unit);
+}
+
+std::string range_of(const Parameter& row) {
+  return fmt::format("{} to {}", with_unit(row.lower, row), with_unit(row.upper, row));
+}
+
+/// @param place, key  what to name in a complaint: the table that holds the number, and its key there
+void check_range(const TomlReader& place, std::string_view key, double number, const Parameter& row) {
+  if (row.name.ends_with("poisson_ratio") && number >= 0.5)
+    place.fail(key, "must be < 0.5: at 0.5 tissue is incompressible and these elements lock; 0.45 to 0.49 is usual");
+  if (number < row.lower || number > row.upper)
+    place.fail(key, fmt::format("out of range: {} must be in {}{}", row.name, range_of(row),
+                                row.meaning.empty() ? "" : " (" + row.meaning + ")"));
+}
+
+void read_free_setting(const TomlReader& entry, const Parameter& row, Setting& setting) {
+  entry.allow({"value", "prior_sd", "lower", "upper"});
+  const auto value = entry.number("value");
+  if (!value) entry.fail("value", "is missing: a free parameter needs a value to start from");
+  setting.free = true;
+  setting.value = *value;
+  setting.prior_sd = entry.number("prior_sd");
+  setting.lower = entry.number("lower").value_or(row.lower);
+  setting.upper = entry.number("upper").value_or(row.upper);
+  for (const char* key : {"value", "lower", "upper"})
+    if (const auto number = entry.number(key)) check_range(entry, key, *number, row);
+  if (setting.prior_sd && *setting.prior_sd <= 0) entry.fail("prior_sd", "must be > 0");
+  if (setting.lower >= setting.upper)
+    entry.fail("lower", fmt::format("must be below upper = {}", with_unit(setting.upper, row)));
+  if (setting.value < setting.lower || setting.value > setting.upper)
+    entry.fail("value", fmt::format("must lie between lower = {} and upper = {}", with_unit(setting.lower, row),
+                                    with_unit(setting.upper, row)));
+}
+
+/// Reads @p key of @p section, where it is written, into @p setting: a number is fixed, a table is free.
+void read_setting(const TomlReader& section, const std::string& key, const Parameter& row, Setting& setting) {
+  setting.lower = row.lower;
+  setting.upper = row.upper;
+  if (!section.has(key)) return;
+  if (section.table().get(key)->is_table()) return read_free_setting(*section.sub_table(key), row, setting);
+  if (!section.table().get(key)->is_number())
+    section.fail(
+        key, "must be a number (fixed) or a table { value = ..., prior_sd = ..., lower = ..., upper = ... } (free)");
+  setting.value = *section.number(key);
+  check_range(section, key, setting.value, row);
+}
+
+template <class Choice>
+void read_choice(const std::optional<TomlReader>& section, std::string_view key,
+                 const std::vector<std::pair<std::string, Choice>>& values, Choice& choice) {
+  if (!section || !section->has(key)) return;
+  std::vector<std::string> names;
+  for (const auto& [name, value] : values) names.push_back(name);
+  const std::string chosen = section->choice(key, names, "");
+  choice = std::find_if(values.begin(), values.end(), [&](const auto& v) { return v.first == chosen; })->second;
+}
+
+void read_choices(const TomlReader& file, Model& model) {
+  using namespace simulation;
+  const auto breast = file.sub_table("breast"), skin = file.sub_table("skin");
+  read_choice<BulkLaw>(breast, "law", bulk_law_names(), model.breast.law);
+  read_choice<Volumetric>(breast, "volumetric", {{"mean", Volumetric::mean}, {"pointwise", Volumetric::pointwise}},
+                          model.breast.volumetric);
+  read_choice<DensityReference>(breast, "density_refers_to",
+                                {{"imaged", DensityReference::imaged}, {"undeformed", DensityReference::undeformed}},
+                                model.breast.density_refers_to);
+  read_choice<SkinLaw>(skin, "law", {{"neo_hookean", SkinLaw::neo_hookean}, {"corotational", SkinLaw::corotational}},
+                       model.skin.law);
+  read_choice<Compression>(skin, "compression",
+                           {{"tension_field", Compression::tension_field}, {"full", Compression::full}},
+                           model.skin.compression);
+  read_choice<InterfaceKind>(file.sub_table("interface"), "kind",
+                             {{"sliding", InterfaceKind::sliding}, {"fixed", InterfaceKind::fixed}},
+                             model.interface.kind);
+  read_choice<CutKind>(file.sub_table("cut"), "kind", {{"elastic", CutKind::elastic}, {"held", CutKind::held}},
+                       model.cut.kind);
+}
+
+/// "section" and "key" of a base row.
+std::pair<std::string, std::string> split_name(const std::string& name) {
+  const auto dot = name.find('.');
+  return {name.substr(0, dot), name.substr(dot + 1)};
+}
+
+void check_base_keys(const TomlReader& file) {
+  std::map<std::string, std::vector<std::string>> known = {{"breast", {"law", "density_refers_to", "volumetric"}},
+                                                           {"skin", {"law", "compression"}},
+                                                           {"interface", {"kind"}},
+                                                           {"cut", {"kind"}}};
+  for (const Parameter& row : simulation::base_parameters()) {
+    const auto [section, key] = split_name(row.name);
+    known[section].push_back(key);
+  }
+  for (const auto& [section, keys] : known)
+    if (const auto table = file.sub_table(section)) table->allow(keys);
+}
+
+void read_base(const TomlReader& file, Model& model) {
+  check_base_keys(file);
+  read_choices(file, model);
+  for (const Parameter& row : simulation::base_parameters()) {
+    const auto [section, key] = split_name(row.name);
+    const auto table = file.sub_table(section);
+    if (const std::string reason = simulation::why_not_of(model, row.name); !reason.empty()) {
+      if (table && table->has(key)) table->fail(key, reason);
+      continue;
+    }
+    Setting& setting = base_setting(model, row.name);
+    if (table)
+      read_setting(*table, key, row, setting);
+    else
+      setting.lower = row.lower, setting.upper = row.upper;
+  }
+}
+
+const simulation::Effect& effect_of(const TomlReader& entry) {
+  const std::string name = entry.required_text("name");
+  if (const simulation::Effect* effect = simulation::find_effect(name)) return *effect;
+  std::vector<std::string> names;
+  for (const simulation::Effect* effect : simulation::catalogue()) names.push_back(effect->name());
+  const std::string nearest = nearest_name(name, names);
+  entry.fail("name", nearest.empty() ? "unknown effect; there are " + listed(names)
+                                     : fmt::format("unknown effect; did you mean {}?", nearest));
+}
+
+simulation::EffectSetting read_effect(const TomlReader& entry) {
+  const simulation::Effect& effect = effect_of(entry);
+  std::vector<std::string> known = {"name"};
+  for (const Parameter& row : effect.parameters()) known.push_back(row.name);
+  for (const auto& option : effect.options()) known.push_back(option.name);
+  entry.allow(known);
+  simulation::EffectSetting result;
+  result.name = effect.name();
+  for (const Parameter& row : effect.parameters()) {
+    Setting& setting = result.parameters[row.name];
+    setting.value = row.median;
+    read_setting(entry, row.name, row, setting);
+  }
+  for (const auto& option : effect.options())
+    result.options[option.name] = entry.choice(option.name, option.values, option.default_value);
+  return result;
+}
+
+void read_effects(const TomlReader& file, Model& model) {
+  if (!file.has("effect")) return;
+  const toml::array* entries = file.table().get_as<toml::array>("effect");
+  if (!entries || !entries->is_array_of_tables())
+    file.fail("effect", "must be tables: write [[effect]], with two brackets, on a line of its own");
+  std::set<std::string> seen;
+  for (const toml::node& node : *entries) {
+    const TomlReader entry(*node.as_table(), file.file(), "[effect]");
+    model.effects.push_back(read_effect(entry));
+    if (!seen.insert(model.effects.back().name).second) entry.fail("name", "this effect is in the file already");
+  }
+}
+
+}  // namespace
+
+simulation::Model read_model(const std::filesystem::path& path) {
+  const toml::table table = parse_toml(path);
+  const TomlReader file(table, path, "");
+  file.allow({"breast", "skin", "interface", "cut", "effect"});
+  Model model;
+  read_base(file, model);
+  read_effects(file, model);
+  return model;
+}
+
+}  // namespace supine::pipeline

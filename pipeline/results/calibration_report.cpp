@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/results/calibration_report.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace supine::pipeline {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using calibration::DistanceFigures;
+using calibration::FreeParameters;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json figures_json(const DistanceFigures& f) {
+  return {{"mae_mm", number(f.mae_mm)},
+          {"rms_mm", number(f.rms_mm)},
+          {"median_mm", number(f.median_mm)},
+          {"p95_mm", number(f.p95_mm)},
+          {"mean_signed_mm", number(f.mean_signed_mm)}};
+}
+
+Json parameters_json(const FreeParameters& parameters, const CalibrationResult& result) {
+  Json list = Json::array();
+  for (Eigen::Index i = 0; i < parameters.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    list.push_back({{"name", parameters.names()[k]},
+                    {"value", parameters.value(i, result.fit.u[i])},
+                    {"unit", parameters.unit(i)},
+                    {"start", parameters.value(i, parameters.start()[i])},
+                    {"interval95", {result.intervals[k].low, result.intervals[k].high}},
+                    {"at_bound", parameters.at_bound(result.fit.u, i)}});
+  }
+  return list;
+}
+
+Json worth_json(const FreeParameters& parameters, const CalibrationResult& result) {
+  const auto& u = result.uncertainty;
+  const Eigen::VectorXd sd = u.covariance.diagonal().cwiseSqrt();
+  Json correlation = Json::array(), pairs = Json::array(), singular = Json::array();
+  for (Eigen::Index i = 0; i < sd.size(); ++i) {
+    Json row = Json::array();
+    for (Eigen::Index j = 0; j < sd.size(); ++j) row.push_back(u.covariance(i, j) / (sd[i] * sd[j]));
+    correlation.push_back(row);
+    singular.push_back(u.singular[i]);
+  }
+  for (const auto& pair : u.not_told_apart)
+    pairs.push_back({{"first", pair.first}, {"second", pair.second}, {"correlation", pair.correlation}});
+  Json coordinates = Json::array();
+  for (Eigen::Index i = 0; i < sd.size(); ++i)
+    coordinates.push_back({{"name", parameters.names()[static_cast<std::size_t>(i)]},
+                           {"coordinate", parameters.is_log(i) ? "ln(value)" : "value, scaled"},
+                           {"sd", sd[i]},
+                           {"sd_if_points_erred_alone", std::sqrt(u.white(i, i))}});
+  return {{"rank", u.rank},
+          {"coordinates", coordinates},
+          {"correlation", correlation},
+          {"singular_values", singular},
+          {"not_told_apart", pairs}};
+}
+
+}  // namespace
+
+std::vector<std::string> calibration_remarks(const FreeParameters& parameters, const CalibrationResult& result) {
+  std::vector<std::string> remarks;
+  const auto& names = parameters.names();
+  for (Eigen::Index i = 0; i < parameters.size(); ++i)
+    if (parameters.at_bound(result.fit.u, i))
+      remarks.push_back(
+          fmt::format("{} ended at an end of its range ({:.4g} {}): the data pull it further, or say nothing about it",
+                      names[static_cast<std::size_t>(i)], parameters.value(i, result.fit.u[i]), parameters.unit(i)));
+  for (const auto& pair : result.uncertainty.not_told_apart)
+    remarks.push_back(fmt::format("{} and {} cannot be told apart here (correlation {:.3f}): {}", pair.first,
+                                  pair.second, pair.correlation,
+                                  pair.correlation < 0 ? "one falls as the other rises, and the error hardly changes"
+                                                       : "they rise and fall together"));
+  if (result.uncertainty.rank < parameters.size())
+    remarks.push_back(fmt::format("the measurement determines {} of {} directions of the parameters",
+                                  result.uncertainty.rank, parameters.size()));
+  const auto is_free = [&names](const char* name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  const simulation::Model model = parameters.model(result.fit.u);
+  const double modulus = model.skin.young_modulus_kpa.value, thickness = model.skin.thickness_mm.value;
+  remarks.push_back(fmt::format("the skin enters as modulus × thickness only: {:.4g} kPa × {:.4g} mm = {:.4g} kPa mm{}",
+                                modulus, thickness, modulus * thickness,
+                                is_free("skin.young_modulus_kpa") && is_free("skin.thickness_mm")
+                                    ? "; both are free, which no data can settle"
+                                    : ""));
+  remarks.push_back(fmt::format(
+      "stiffness enters as stiffness / density only: with another density than {:.4g} kg/m3 every modulus and spring "
+      "changes in proportion",
+      model.breast.density_kg_m3.value));
+  return remarks;
+}
+
+Json calibration_figures(const MeasuredCase& measured, const FreeParameters& parameters,
+                         const CalibrationResult& result) {
+  const calibration::Fit& fit = result.fit;
+  Json f;
+  f["method"] = result.method;
+  f["mae_study_mm"] = number(fit.prediction.mae_study_mm());
+  f["mae_mm"] = result.in_sample.mae_mm;
+  f["rms_mm"] = result.in_sample.rms_mm;
+  f["held_out_rms_mm"] = result.held_out_blocks.rms_mm;
+  f["held_out"] = {{"blocks", 6}, {"by_block", figures_json(result.held_out_blocks)}, {"by_pose", Json::array()}};
+  for (const auto& pose : result.held_out_poses) {
+    Json row = {{"pose", pose.pose}, {"mae_study_mm", number(pose.mae_study_mm)}};
+    row.update(figures_json(pose.figures));
+    f["held_out"]["by_pose"].push_back(row);
+  }
+  f["parameters"] = parameters_json(parameters, result);
+  f["interval_kind"] = result.interval_kind;
+  f["evaluations"] = fit.evaluations;
+  f["iterations"] = fit.iterations;
+  f["failed_solves"] = fit.failed;
+  f["converged"] = fit.converged;
+  f["message"] = fit.message;
+  f["start_costs"] = Json::array();
+  for (const double cost : fit.start_costs) f["start_costs"].push_back(number(cost));
+  f["scan_points_used"] = fit.residuals.size();
+  f["poses"] = Json::array();
+  for (std::size_t m = 0; m < measured.fitted.size(); ++m)
+    f["poses"].push_back({{"pose", measured.fitted[m].pose.name},
+                          {"noise_mm", result.noise_mm[m]},
+                          {"noise_is", measured.fitted[m].noise_mm ? "given" : "estimated"},
+                          {"points_left_out", measured.fitted[m].left_out.size()}});
+  const auto& errors = result.uncertainty.errors;
+  f["error_model"] = {{"nugget_mm", errors.nugget_mm},
+                      {"shared_mm", errors.spread_mm},
+                      {"length_mm", errors.length_mm},
+                      {"effective_points", result.uncertainty.effective_points}};
+  f["worth"] = worth_json(parameters, result);
+  f["remarks"] = calibration_remarks(parameters, result);
+  return f;
+}
+
+void say_calibration(const Run& run, const FreeParameters& parameters, const CalibrationResult& result) {
+  run.say(fmt::format("  {:<36}{:>10}{:>10}   {}", "parameter", "start", "fitted", "95 % interval"));
+  for (Eigen::Index i = 0; i < parameters.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    run.say(fmt::format("  {:<36}{:>10.4g}{:>10.4g}   {:.4g} to {:.4g} {}", parameters.names()[k],
+                        parameters.value(i, parameters.start()[i]), parameters.value(i, result.fit.u[i]),
+                        result.intervals[k].low, result.intervals[k].high,
+                        parameters.unit(i) == "1" ? "" : parameters.unit(i)));
+  }
+  const auto row = [&run](const std::string& what, const DistanceFigures& f) {
+    run.say(fmt::format("  {:<36}{:>10.3f}{:>10.3f}", what, f.mae_mm, f.rms_mm));
+  };
+  run.say(fmt::format("  {:<36}{:>10}{:>10}", "error, mm", "MAE", "RMS"));
+  row("fitted points", result.in_sample);
+  row("held out, 6 blocks of skin", result.held_out_blocks);
+  for (const auto& pose : result.held_out_poses) row("held out, pose " + pose.pose, pose.figures);
+  run.say(fmt::format("  {:<36}{:>10.3f}", "MAE model to scan (study)", result.fit.prediction.mae_study_mm()));
+  run.say(fmt::format("  {} chain runs, {} of them without equilibrium; {} steps{}", result.fit.evaluations,
+                      result.fit.failed, result.fit.iterations, result.fit.converged ? "" : "; NOT converged"));
+  for (const std::string& remark : calibration_remarks(parameters, result)) run.say("  - " + remark);
+}
+
+}  // namespace supine::pipeline

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "calibration/uncertainty.h"
+#include "pipeline/case/measured_case.h"
+
+namespace supine::pipeline {
+
+/// A calibrated model with what it is worth, whatever method found it.
+struct CalibrationResult {
+  std::string method;  ///< least-squares or cmaes
+  calibration::Fit fit;
+  calibration::Uncertainty uncertainty;
+  std::vector<calibration::Interval> intervals;
+  std::string interval_kind;  ///< profile or linear
+  std::vector<double> noise_mm;
+  calibration::DistanceFigures in_sample;        ///< points that were fitted
+  calibration::DistanceFigures held_out_blocks;  ///< the same points, each predicted from a fit without its block
+  struct PoseError {
+    std::string pose;
+    double mae_study_mm;
+    calibration::DistanceFigures figures;
+  };
+  std::vector<PoseError> held_out_poses;
+};
+
+/// Keys as in docs/calibration.md.
+nlohmann::ordered_json calibration_figures(const MeasuredCase& measured, const calibration::FreeParameters& parameters,
+                                           const CalibrationResult& result);
+
+/// What a person should know of parameters at their bounds, products and pairs, one sentence each.
+std::vector<std::string> calibration_remarks(const calibration::FreeParameters& parameters,
+                                             const CalibrationResult& result);
+
+void say_calibration(const Run& run, const calibration::FreeParameters& parameters, const CalibrationResult& result);
+
+}  // namespace supine::pipeline

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/results/ladder_report.h"
+
+#include <fmt/core.h>
+
+#include <fstream>
+
+#include "calibration/free_parameters.h"
+#include "common/error.h"
+#include "pipeline/case/model_edit.h"
+#include "pipeline/case/model_file.h"
+
+namespace supine::pipeline {
+namespace {
+
+using diagnosis::RungFigures;
+using Json = nlohmann::ordered_json;
+
+Json figures_json(const RungFigures& r) {
+  const auto& poses = r.held_out_pose_rms_mm;
+  return {{"added", r.added},
+          {"mae_mm", r.mae_mm},
+          {"rms_mm", r.rms_mm},
+          {"held_out_rms_mm", r.held_out_rms_mm},
+          {"held_out_pose_rms_mm", poses.empty() ? Json(nullptr) : Json(poses)}};
+}
+
+Json or_null(const std::optional<RungFigures>& figures) { return figures ? figures_json(*figures) : Json(nullptr); }
+
+Json rung_json(const diagnosis::Rung& rung) {
+  Json json = figures_json(rung);
+  json["p_value"] = rung.p_value;
+  if (!rung.added.empty())
+    json["controls"] = {{"refit_only", or_null(rung.refit_only)}, {"random_other", or_null(rung.random_other)}};
+  return json;
+}
+
+/// Names and values of what is free.
+std::map<std::string, double> fitted_values(const simulation::Model& model) {
+  const calibration::FreeParameters parameters(model);
+  std::map<std::string, double> values;
+  for (Eigen::Index i = 0; i < parameters.size(); ++i)
+    values[parameters.names()[static_cast<std::size_t>(i)]] = parameters.value(i, parameters.start()[i]);
+  return values;
+}
+
+void replace(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  if (!stream) throw InputError(fmt::format("cannot write {}", file.string()));
+}
+
+}  // namespace
+
+Json ladder_figures(const diagnosis::Ladder& ladder) {
+  Json f;
+  f["rungs"] = Json::array();
+  for (const auto& rung : ladder.rungs) f["rungs"].push_back(rung_json(rung));
+  f["verdict"] = diagnosis::verdict_name(ladder.verdict);
+  f["missing"] = ladder.missing;
+  f["last"] = {{"verdict", diagnosis::verdict_name(ladder.last.verdict)}, {"missing", ladder.last.missing}};
+  f["stopped"] = ladder.stopped;
+  f["noise_floor_mm"] = ladder.noise_floor_mm;
+  f["parameters"] = fitted_values(ladder.model);
+  return f;
+}
+
+void say_ladder(const Run& run, const diagnosis::Ladder& ladder) {
+  const auto line = [&run](const std::string& name, const RungFigures& r) {
+    run.say(fmt::format("  {:<34}{:>8.3f}{:>8.3f}{:>10.3f}{:>10}", name, r.mae_mm, r.rms_mm, r.held_out_rms_mm,
+                        r.held_out_pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", r.held_out_pose_rms_mm[0])));
+  };
+  run.say(fmt::format("  {:<34}{:>8}{:>8}{:>10}{:>10}", "ladder, mm", "MAE", "RMS", "held out", "pose"));
+  line("refit only", ladder.rungs.front());
+  for (std::size_t r = 1; r < ladder.rungs.size(); ++r) {
+    const diagnosis::Rung& rung = ladder.rungs[r];
+    if (rung.random_other) line("control: + " + rung.random_other->added, *rung.random_other);
+    line("+ " + rung.added, rung);
+  }
+  run.say(fmt::format("  noise and mesh alone would leave {:.2f}; stopped: {}", ladder.noise_floor_mm, ladder.stopped));
+}
+
+void write_rung_model(const diagnosis::Ladder& ladder, std::size_t rung, const std::filesystem::path& read_from,
+                      const std::filesystem::path& file) {
+  std::filesystem::copy_file(read_from, file, std::filesystem::copy_options::overwrite_existing);
+  const simulation::Model& model = ladder.rungs[rung].model;
+  for (std::size_t r = 1; r <= rung; ++r) replace(file, with_effect(file, ladder.rungs[r].added));
+  replace(file, with_values(file, fitted_values(model)));
+  read_model(file);
+}
+
+}  // namespace supine::pipeline

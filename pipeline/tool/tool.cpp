@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/tool/tool.h"
+
+#include <fmt/core.h>
+#include <omp.h>
+
+#include <filesystem>
+#include <new>
+
+#include "common/error.h"
+#include "pipeline/tool/provenance.h"
+#include "pipeline/tool/runtime_settings.h"
+
+extern "C" void openblas_set_num_threads(int threads);
+
+namespace supine::pipeline {
+namespace {
+
+constexpr int exit_bad_input = 2;
+constexpr int exit_numerical_failure = 3;
+
+struct CommonOptions {
+  int threads = 0;
+  bool json = false, force = false, quiet = false;
+};
+
+void declare_common(CLI::App& app, Tool& tool, CommonOptions& common) {
+  app.option_defaults()->always_capture_default();
+  app.set_version_flag("--version", [&tool] { return version_text(tool.name()); });
+  app.add_option("-o,--output", tool.output, "output file or folder");
+  app.add_option("--threads", common.threads, "threads to use, 0 = all; changes no result")->check(CLI::Range(0, 1024));
+  app.add_flag("--json", common.json, "print the figures as JSON on standard output instead of the table");
+  app.add_flag("--force", common.force, "replace output files that exist");
+  app.add_flag("--quiet", common.quiet, "print warnings and errors only");
+}
+
+/// Parallelism is that of our own loops; BLAS on one thread keeps results identical for any thread count.
+int use_threads(int wanted) {
+  const int threads = wanted > 0 ? wanted : omp_get_max_threads();
+  omp_set_num_threads(threads);
+  openblas_set_num_threads(1);
+  return threads;
+}
+
+void say_options(const Run& run, const Tool& tool, const nlohmann::ordered_json& options) {
+  std::string line;
+  for (const auto& [name, value] : options.items()) {
+    if (value.empty() || value == false || value == "") continue;
+    line += fmt::format("{}{} = {}", line.empty() ? ": " : ", ", name,
+                        value.is_string() ? value.get<std::string>() : value.dump());
+  }
+  run.say(fmt::format("{} {}{}", tool.name(), supine_version(), line));
+}
+
+int work(Tool& tool, const CLI::App& app, const CommonOptions& common) {
+  auto options = resolved_options(app);
+  const int threads = use_threads(common.threads);
+  options["threads"] = threads;
+  Run run(tool.name(), common.force, common.quiet, common.json, threads, options);
+  say_options(run, tool, options);
+  const Outcome outcome = tool.run(run);
+  run.finish();
+  return static_cast<int>(outcome);
+}
+
+int complain(const Tool& tool, std::string_view message, int code) {
+  fmt::print(stderr, "{}: error: {}\n", tool.name(), message);
+  return code;
+}
+
+}  // namespace
+
+int tool_main(Tool& tool, int argc, char** argv) {
+  use_fitting_settings(argv);
+  install_interrupt_handler();
+  CLI::App app(tool.summary(), tool.name());
+  CommonOptions common;
+  declare_common(app, tool, common);
+  tool.declare(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& stopped) {
+    if (stopped.get_exit_code() == 0) return app.exit(stopped);  // --help, --version
+    return complain(tool, fmt::format("{}\nRun {} --help for the options.", stopped.what(), tool.name()),
+                    exit_bad_input);
+  }
+  try {
+    return work(tool, app, common);
+  } catch (const InputError& error) {
+    return complain(tool, error.what(), exit_bad_input);
+  } catch (const NumericalFailure& error) {
+    return complain(tool, error.what(), exit_numerical_failure);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return complain(tool, error.what(), exit_bad_input);
+  } catch (const std::bad_alloc&) {
+    return complain(tool, "out of memory; use a coarser volume or fewer triangles", exit_numerical_failure);
+  } catch (const std::exception& error) {
+    return complain(tool, fmt::format("{} (this should not happen; please report it)", error.what()),
+                    exit_numerical_failure);
+  }
+}
+
+}  // namespace supine::pipeline

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "segmentation/chest/chest_wall.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/error.h"
+#include "segmentation/chest/fan.h"
+#include "segmentation/chest/sampler.h"
+
+namespace supine::segmentation {
+namespace {
+
+constexpr double farthest_mm = 220;        // from the centre that the wall may lie
+constexpr double widest_angle_rad = 1.83;  // 105 degrees to either side
+constexpr double one_degree = std::numbers::pi / 180;
+constexpr double oval_reach_mm = 25;
+constexpr double oval_blur_mm = 4;        // either side of an oval that counts for it
+constexpr double coupling_reach_mm = 20;  // a neighbour farther off pulls no harder
+constexpr int most_sweeps = 12;
+// Lines are seen best along their own course: the fan is bent to what is known of it and averaged over neighbours.
+struct Bending {
+  double reach_mm;
+  int angles, levels;  // averaged to either side
+};
+constexpr Bending first_look{0, 1, 1}, bendings[] = {{30, 3, 2}, {10, 4, 3}};
+
+using Chains = std::vector<std::vector<int>>;
+
+/// min over j of value[j] + slope |i - j|, and the j it is reached at.
+void spread(std::vector<double>& value, std::vector<int>& from, double slope) {
+  const int n = static_cast<int>(value.size());
+  for (int i = 0; i < n; ++i) from[i] = i;
+  for (int i = 1; i < n; ++i)
+    if (value[i - 1] + slope < value[i]) {
+      value[i] = value[i - 1] + slope;
+      from[i] = from[i - 1];
+    }
+  for (int i = n - 2; i >= 0; --i)
+    if (value[i + 1] + slope < value[i]) {
+      value[i] = value[i + 1] + slope;
+      from[i] = from[i + 1];
+    }
+}
+
+/// The search for the cheapest surface in one fan.
+class Search {
+ public:
+  Search(const Fan& fan, const std::vector<float>& prices, const ChestWall& wall, const ChestWallOptions& options)
+      : fan_(fan), prices_(prices), options_(options) {
+    oval_.resize(fan.angles(), fan.levels());
+    for (Eigen::Index k = 0; k < fan.levels(); ++k)
+      for (Eigen::Index a = 0; a < fan.angles(); ++a)
+        oval_(a, k) = (wall.oval.radius_mm(wall.angle(a), wall.z(k)) - fan.radius_mm(a, k, 0)) / Fan::step_mm;
+  }
+
+  /// Sweeps over the levels until no chain changes.
+  Chains settle() const {
+    Chains chains;
+    const auto n = static_cast<int>(fan_.levels());
+    for (int k = 0; k < n; ++k) chains.push_back(cheapest(k, {}));
+    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
+      bool changed = false;
+      for (int step = 0; step < n; ++step) {
+        const int k = sweep % 2 == 0 ? step : n - 1 - step;
+        std::vector<const std::vector<int>*> neighbours;
+        if (k > 0) neighbours.push_back(&chains[k - 1]);
+        if (k + 1 < n) neighbours.push_back(&chains[k + 1]);
+        auto chain = cheapest(k, neighbours);
+        changed |= chain != chains[k];
+        chains[k] = std::move(chain);
+      }
+      if (!changed) break;
+    }
+    return chains;
+  }
+
+ private:
+  /// Price of a sample with the pulls of the oval and of the neighbouring levels.
+  double price(Eigen::Index a, int k, int i, const std::vector<const std::vector<int>*>& neighbours) const {
+    constexpr double step = Fan::step_mm;
+    double sum = prices_[fan_.ray(a, k) * fan_.count + i] +
+                 options_.oval_pull_per_mm * std::min(oval_reach_mm, step * std::abs(i - oval_(a, k)));
+    for (const auto* other : neighbours)
+      sum += options_.coupling_per_mm * std::min(coupling_reach_mm, step * std::abs(i - (*other)[a]));
+    return sum;
+  }
+  /// The cheapest chain of samples over the rays of a level.
+  std::vector<int> cheapest(int k, const std::vector<const std::vector<int>*>& neighbours) const {
+    const auto angles = static_cast<std::size_t>(fan_.angles());
+    const int n = fan_.count;
+    std::vector<std::vector<int>> from(angles, std::vector<int>(n));
+    std::vector<double> value(n);
+    for (int i = 0; i < n; ++i) value[i] = price(0, k, i, neighbours);
+    for (std::size_t a = 1; a < angles; ++a) {
+      spread(value, from[a], options_.stiffness_per_mm * Fan::step_mm);
+      for (int i = 0; i < n; ++i) value[i] += price(static_cast<Eigen::Index>(a), k, i, neighbours);
+    }
+    std::vector<int> chain(angles);
+    chain.back() = static_cast<int>(std::min_element(value.begin(), value.end()) - value.begin());
+    for (std::size_t a = angles - 1; a > 0; --a) chain[a - 1] = from[a][chain[a]];
+    return chain;
+  }
+
+  const Fan& fan_;
+  const std::vector<float>& prices_;
+  const ChestWallOptions& options_;
+  Eigen::ArrayXXd oval_;  // sample of the rough oval on each ray
+};
+
+/// The oval whose border is cheapest, taken over a few millimetres to either side because no chest is an oval.
+Oval find_oval(const Fan& fan, const std::vector<float>& prices, const ChestWall& wall, double centre_depth_mm) {
+  const int blur = static_cast<int>(oval_blur_mm / Fan::step_mm), n = fan.count;
+  std::vector<float> near(prices.size());
+#pragma omp parallel for schedule(static)
+  for (std::size_t ray = 0; ray < fan.end.size(); ++ray)
+    for (int i = 0; i < n; ++i) {
+      double sum = 0, weight = 0;
+      for (int j = std::max(0, i - blur); j <= std::min(n - 1, i + blur); ++j) {
+        const double w = blur + 1 - std::abs(i - j);
+        sum += w * prices[ray * n + j];
+        weight += w;
+      }
+      near[ray * n + i] = static_cast<float>(sum / weight);
+    }
+  const auto price = [&](const Oval& oval) {
+    double sum = 0;  // every sixth ray is plenty for four numbers
+    for (Eigen::Index k = 0; k < fan.levels(); k += 2)
+      for (Eigen::Index a = 0; a < fan.angles(); a += 3) {
+        const double i = (oval.radius_mm(wall.angle(a), wall.z(k)) - fan.radius_mm(a, k, 0)) / Fan::step_mm;
+        sum += near[fan.ray(a, k) * n + std::clamp(static_cast<int>(std::lround(i)), 0, n - 1)];
+      }
+    return sum;
+  };
+  return best_oval(price, centre_depth_mm, wall.z(fan.levels() / 2));
+}
+
+/// The radius nearest to `radius` at which the grey rises through the half-way level; `radius` when there is none.
+double half_way(const GreyImage& image, const ChestWallOptions& options, const Eigen::Vector3d& from,
+                const Eigen::Vector3d& along, double radius) {
+  const double fine_mm = 0.25;
+  const float level = (options.dark + options.bright) / 2;
+  double best = radius, best_distance = INFINITY;
+  float before = sample(image, from + along * (radius - options.refine_mm));
+  for (double r = radius - options.refine_mm + fine_mm; r <= radius + options.refine_mm; r += fine_mm) {
+    const float grey = sample(image, from + along * r);
+    if (before < level && grey >= level) {
+      const double at = r - fine_mm * (grey - level) / (grey - before);
+      if (std::abs(at - radius) < best_distance) {
+        best_distance = std::abs(at - radius);
+        best = at;
+      }
+    }
+    before = grey;
+  }
+  return best;
+}
+
+/// Takes the border of the fan over to the wall.
+void settle(const Fan& fan, const std::vector<float>& prices, const ChestWallOptions& options, ChestWall& wall) {
+  const Chains chains = Search(fan, prices, wall, options).settle();
+  wall.radius_mm.resize(fan.angles(), fan.levels());
+  wall.price.resize(fan.angles(), fan.levels());
+  for (Eigen::Index k = 0; k < fan.levels(); ++k)
+    for (Eigen::Index a = 0; a < fan.angles(); ++a) {
+      const int i = chains[k][a];
+      wall.price(a, k) = fan.seen(a, k) ? prices[fan.ray(a, k) * fan.count + i] : NAN;
+      wall.radius_mm(a, k) = fan.radius_mm(a, k, i);
+    }
+}
+
+void refine(const GreyImage& image, const ChestWallOptions& options, ChestWall& wall) {
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index k = 0; k < wall.radius_mm.cols(); ++k)
+    for (Eigen::Index a = 0; a < wall.radius_mm.rows(); ++a)
+      wall.radius_mm(a, k) = half_way(image, options, wall.centre(k), wall.direction(a), wall.radius_mm(a, k));
+}
+
+void check(const ChestWallOptions& o) {
+  if (!(o.bright > o.dark))
+    throw InputError(fmt::format("chest_wall: bright = {} must be above dark = {}", o.bright, o.dark));
+  for (const auto& [name, value] : {std::pair("band_mm", o.band_mm), {"centre_depth_mm", o.centre_depth_mm}})
+    if (!(value > 0)) throw InputError(fmt::format("chest_wall: {} = {} must be > 0", name, value));
+}
+
+}  // namespace
+
+Eigen::Vector3d ChestWall::point(Eigen::Index a, Eigen::Index k) const {
+  return centre(k) + radius_mm(a, k) * direction(a);
+}
+
+double ChestWall::depth_mm(const Eigen::Vector3d& p) const {
+  const double x = p.x() - torso.sternum_x(p.z()), y = centre_y_mm - p.y();
+  const double a = (std::atan2(x, y) - first_angle_rad) / step_angle_rad, k = (p.z() - z0_mm) / step_z_mm;
+  const auto last_a = radius_mm.rows() - 1, last_k = radius_mm.cols() - 1;
+  const double ca = std::clamp<double>(a, 0, static_cast<double>(last_a)),
+               ck = std::clamp<double>(k, 0, static_cast<double>(last_k));
+  const auto ia = std::min(static_cast<Eigen::Index>(ca), std::max<Eigen::Index>(0, last_a - 1));
+  const auto ik = std::min(static_cast<Eigen::Index>(ck), std::max<Eigen::Index>(0, last_k - 1));
+  const double ta = ca - static_cast<double>(ia), tk = ck - static_cast<double>(ik);
+  const auto ja = std::min(ia + 1, last_a), jk = std::min(ik + 1, last_k);
+  const double r = (1 - tk) * ((1 - ta) * radius_mm(ia, ik) + ta * radius_mm(ja, ik)) +
+                   tk * ((1 - ta) * radius_mm(ia, jk) + ta * radius_mm(ja, jk));
+  return r - std::hypot(x, y);
+}
+
+ChestWall find_chest_wall(const GreyImage& image, const Mask& body, const Torso& torso,
+                          const ChestWallOptions& options) {
+  check(options);
+  const FrontSkin front = front_skin(body, image.grid);  // for its levels
+  ChestWall wall;
+  wall.torso = torso;
+  wall.border = options.border;
+  wall.centre_y_mm = torso.sternum_skin_y_mm + options.centre_depth_mm;
+  wall.z0_mm = front.z0_mm;
+  wall.step_z_mm = front.step_z_mm;
+  const auto half = static_cast<Eigen::Index>(widest_angle_rad / one_degree);
+  wall.first_angle_rad = -static_cast<double>(half) * one_degree;
+  wall.step_angle_rad = one_degree;
+  const bool lines = options.border == ChestWallOptions::Border::line;
+  Fan fan = sample_fan(image, body, wall, Eigen::ArrayXXd::Zero(2 * half + 1, front.y_mm.cols()), 0, farthest_mm);
+  if (lines) blur_fan(fan, first_look.angles, first_look.levels);
+  std::vector<float> prices = price_fan(fan, options);
+  wall.oval = find_oval(fan, prices, wall, options.centre_depth_mm);
+  settle(fan, prices, options, wall);
+  if (!lines) {
+    refine(image, options, wall);
+    return wall;
+  }
+  for (Eigen::Index k = 0; k < fan.levels(); ++k)  // what the first look saw is too noisy: start from the oval
+    for (Eigen::Index a = 0; a < fan.angles(); ++a)
+      wall.radius_mm(a, k) = wall.oval.radius_mm(wall.angle(a), wall.z(k));
+  for (const Bending& bending : bendings) {
+    fan = sample_fan(image, body, wall, wall.radius_mm, -bending.reach_mm, bending.reach_mm);
+    blur_fan(fan, bending.angles, bending.levels);
+    prices = price_fan(fan, options);
+    settle(fan, prices, options, wall);
+  }
+  return wall;
+}
+
+}  // namespace supine::segmentation

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <fmt/format.h>
+#include <teem/nrrd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+
+#include "common/error.h"
+#include "segmentation/formats/image_formats.h"
+
+namespace supine::segmentation::formats {
+namespace {
+
+struct NrrdDeleter {
+  void operator()(Nrrd* nrrd) const { nrrdNuke(nrrd); }
+};
+using NrrdPointer = std::unique_ptr<Nrrd, NrrdDeleter>;
+
+std::string teem_error() {
+  const std::unique_ptr<char, decltype(&std::free)> text(biffGetDone(NRRD), &std::free);
+  std::string message = text ? text.get() : "unknown error";
+  while (!message.empty() && message.back() == '\n') message.pop_back();
+  const auto last = message.rfind('\n');  // the innermost cause is the last line
+  return last == std::string::npos ? message : message.substr(last + 1);
+}
+
+std::optional<std::string> frame_of(const std::filesystem::path& file, const Nrrd& nrrd) {
+  switch (nrrd.space) {
+    case nrrdSpaceLeftPosteriorSuperior:
+      return "LPS";
+    case nrrdSpaceRightAnteriorSuperior:
+      return "RAS";
+    case nrrdSpaceLeftAnteriorSuperior:
+      return "LAS";
+    case nrrdSpaceUnknown:
+    case nrrdSpaceScannerXYZ:
+    case nrrdSpace3DRightHanded:
+    case nrrdSpace3DLeftHanded:
+      return std::nullopt;
+    default:
+      throw InputError(
+          fmt::format("{}: space \"{}\" is not three-dimensional", file.string(), airEnumStr(nrrdSpace, nrrd.space)));
+  }
+}
+
+void check_axes(const std::filesystem::path& file, const Nrrd& nrrd) {
+  if (nrrd.dim != 3)
+    throw InputError(fmt::format("{}: dimension {}; a scalar volume with 3 axes is needed (no colour, time or layers)",
+                                 file.string(), nrrd.dim));
+  for (int a = 0; a < 3; ++a) {
+    const int kind = nrrd.axis[a].kind;
+    if (kind != nrrdKindUnknown && kind != nrrdKindDomain && kind != nrrdKindSpace)
+      throw InputError(fmt::format("{}: axis {} has kind \"{}\"; a scalar volume with 3 space axes is needed",
+                                   file.string(), a, airEnumStr(nrrdKind, kind)));
+  }
+  if (nrrd.type == nrrdTypeBlock || nrrd.type == nrrdTypeUnknown)
+    throw InputError(fmt::format("{}: the voxels are not numbers (type block)", file.string()));
+  if (nrrd.spaceDim != 0 && nrrd.spaceDim != 3)
+    throw InputError(fmt::format("{}: space dimension {}; 3 is needed", file.string(), nrrd.spaceDim));
+  for (unsigned a = 0; a < nrrd.spaceDim; ++a) {
+    const std::string unit = nrrd.spaceUnits[a] ? nrrd.spaceUnits[a] : "";
+    if (!unit.empty() && unit != "mm" && unit != "millimeter" && unit != "millimetre")
+      throw InputError(fmt::format("{}: space units \"{}\"; mm expected: scale space directions and space origin",
+                                   file.string(), unit));
+  }
+}
+
+void read_axes(const std::filesystem::path& file, const Nrrd& nrrd, RawImage& image) {
+  image.axes.setZero();
+  for (int a = 0; a < 3; ++a) {
+    if (nrrd.spaceDim == 3) {
+      for (int c = 0; c < 3; ++c) image.axes(c, a) = nrrd.axis[a].spaceDirection[c];
+      const double origin = nrrd.spaceOrigin[a];
+      image.grid.origin_mm[a] = std::isfinite(origin) ? origin : 0;
+    } else {
+      image.axes(a, a) = nrrd.axis[a].spacing;
+      const double minimum = nrrd.axis[a].min;
+      image.grid.origin_mm[a] = std::isfinite(minimum) ? minimum : 0;
+    }
+    if (!image.axes.col(a).allFinite())
+      throw InputError(
+          fmt::format("{}: axis {} has no spacing; give `space directions` or `spacings`", file.string(), a));
+    // Without a space, a negative spacing would silently flip the patient.
+    if (nrrd.spaceDim == 0 && image.axes(a, a) <= 0)
+      throw InputError(
+          fmt::format("{}: spacing of axis {} is {} mm; it must be > 0", file.string(), a, image.axes(a, a)));
+  }
+}
+
+}  // namespace
+
+RawImage read_nrrd(const std::filesystem::path& file) {
+  const NrrdPointer nrrd(nrrdNew());
+  if (nrrdLoad(nrrd.get(), file.c_str(), nullptr) != 0)
+    throw InputError(
+        fmt::format("{}: cannot be read as NRRD (damaged or truncated?): {}", file.string(), teem_error()));
+  check_axes(file, *nrrd);
+  RawImage image;
+  image.frame = frame_of(file, *nrrd);
+  for (int a = 0; a < 3; ++a) image.grid.size[a] = static_cast<int>(nrrd->axis[a].size);
+  check_size(file, image.grid.size);
+  read_axes(file, *nrrd, image);
+  image.voxels.resize(image.grid.count());
+  const auto lookup = nrrdFLookup[nrrd->type];
+  for (std::size_t n = 0; n < image.voxels.size(); ++n) image.voxels[n] = lookup(nrrd->data, n);
+  return image;
+}
+
+}  // namespace supine::segmentation::formats

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <fmt/format.h>
+#include <vtkCallbackCommand.h>
+#include <vtkCellData.h>
+#include <vtkExecutive.h>
+#include <vtkFieldData.h>
+#include <vtkImageData.h>
+#include <vtkMatrix3x3.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkStringArray.h>
+#include <vtkUnsignedCharArray.h>
+#include <vtkXMLImageDataReader.h>
+#include <vtkXMLImageDataWriter.h>
+
+#include <algorithm>
+
+#include "common/error.h"
+#include "segmentation/formats/image_formats.h"
+#include "segmentation/formats/image_io.h"
+#include "segmentation/formats/labels_io.h"
+#include "segmentation/tissue.h"
+
+namespace supine::segmentation {
+namespace {
+
+constexpr const char* label_array = "tissue";
+
+std::optional<std::string> field_string(vtkImageData& image, const char* name) {
+  auto* array = vtkStringArray::SafeDownCast(image.GetFieldData()->GetAbstractArray(name));
+  if (!array || array->GetNumberOfValues() < 1) return std::nullopt;
+  return array->GetValue(0);
+}
+
+void add_strings(vtkImageData& image, const char* name, std::initializer_list<std::string_view> values) {
+  vtkNew<vtkStringArray> array;
+  array->SetName(name);
+  for (const auto value : values) array->InsertNextValue(std::string(value));
+  image.GetFieldData()->AddArray(array);
+}
+
+/// Collects the text of VTK's errors instead of letting it reach the terminal.
+class ErrorCollector {
+ public:
+  explicit ErrorCollector(vtkAlgorithm& algorithm) {
+    command_->SetCallback([](vtkObject*, unsigned long, void* client, void* text) {
+      auto& message = *static_cast<std::string*>(client);
+      if (message.empty() && text) message = static_cast<const char*>(text);
+    });
+    command_->SetClientData(&message_);
+    algorithm.AddObserver(vtkCommand::ErrorEvent, command_);
+    algorithm.GetExecutive()->AddObserver(vtkCommand::ErrorEvent, command_);
+  }
+  vtkCommand* command() { return command_; }
+  std::string message() const {
+    std::string line = message_;
+    std::replace(line.begin(), line.end(), '\n', ' ');
+    return line;
+  }
+
+ private:
+  std::string message_;
+  vtkNew<vtkCallbackCommand> command_;
+};
+
+void update(vtkXMLImageDataReader& reader, const std::filesystem::path& file) {
+  ErrorCollector errors(reader);
+  reader.SetReaderErrorObserver(errors.command());
+  reader.SetParserErrorObserver(errors.command());
+  reader.SetFileName(file.c_str());
+  reader.Update();
+  reader.SetReaderErrorObserver(nullptr);
+  reader.SetParserErrorObserver(nullptr);
+  reader.RemoveAllObservers();
+  reader.GetExecutive()->RemoveAllObservers();
+  if (!errors.message().empty() || reader.GetErrorCode() != 0)
+    throw InputError(
+        fmt::format("{}: cannot be read as VTI (damaged or truncated?): {}", file.string(), errors.message()));
+}
+
+/// The scalar array: `tissue`, else the active scalars, else the only array; of points, else of cells.
+vtkDataArray* find_scalars(vtkImageData& image, bool& on_cells) {
+  for (const bool cells : {false, true}) {
+    vtkDataSetAttributes* data = cells ? static_cast<vtkDataSetAttributes*>(image.GetCellData()) : image.GetPointData();
+    vtkDataArray* array = data->GetArray(label_array);
+    if (!array) array = data->GetScalars();
+    if (!array && data->GetNumberOfArrays() == 1) array = data->GetArray(0);
+    on_cells = cells;
+    if (array) return array;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+namespace formats {
+
+RawImage read_vti(const std::filesystem::path& file) {
+  vtkNew<vtkXMLImageDataReader> reader;
+  update(*reader, file);
+  vtkImageData& data = *reader->GetOutput();
+  bool on_cells = false;
+  vtkDataArray* scalars = find_scalars(data, on_cells);
+  if (!scalars)
+    throw InputError(fmt::format("{}: no scalar array (`{}`) on points or cells", file.string(), label_array));
+  if (scalars->GetNumberOfComponents() != 1)
+    throw InputError(fmt::format("{}: array \"{}\" has {} components; a scalar volume is needed, not colour",
+                                 file.string(), scalars->GetName() ? scalars->GetName() : "",
+                                 scalars->GetNumberOfComponents()));
+  if (const auto unit = field_string(data, "unit"); unit && *unit != "mm")
+    throw InputError(fmt::format("{}: field data unit is \"{}\"; mm expected", file.string(), *unit));
+  RawImage image;
+  image.frame = field_string(data, "frame");
+  Eigen::Vector3d first;  // continuous index of the first voxel's centre
+  for (int a = 0; a < 3; ++a) {
+    const int *extent = data.GetExtent(), points = extent[2 * a + 1] - extent[2 * a] + 1;
+    image.grid.size[a] = on_cells ? points - 1 : points;
+    first[a] = extent[2 * a] + (on_cells ? 0.5 : 0.0);
+    image.grid.origin_mm[a] = data.GetOrigin()[a];
+    for (int r = 0; r < 3; ++r) image.axes(r, a) = data.GetDirectionMatrix()->GetElement(r, a) * data.GetSpacing()[a];
+    if (!(data.GetSpacing()[a] > 0))
+      throw InputError(
+          fmt::format("{}: Spacing of axis {} is {} mm; it must be > 0", file.string(), a, data.GetSpacing()[a]));
+  }
+  check_size(file, image.grid.size);
+  image.grid.origin_mm += image.axes * first;
+  if (static_cast<std::size_t>(scalars->GetNumberOfTuples()) != image.grid.count())
+    throw InputError(
+        fmt::format("{}: {} values for {} voxels", file.string(), scalars->GetNumberOfTuples(), image.grid.count()));
+  image.voxels.resize(image.grid.count());
+  if (auto* bytes = vtkUnsignedCharArray::SafeDownCast(scalars)) {
+    std::copy_n(bytes->GetPointer(0), image.voxels.size(), image.voxels.begin());
+  } else {
+    for (std::size_t n = 0; n < image.voxels.size(); ++n)
+      image.voxels[n] = static_cast<float>(scalars->GetComponent(static_cast<vtkIdType>(n), 0));
+  }
+  return image;
+}
+
+}  // namespace formats
+
+void write_labels(const LabelImage& labels, const std::filesystem::path& file, const LabelNotes& notes) {
+  const Grid& grid = labels.grid;
+  vtkNew<vtkImageData> data;
+  data->SetDimensions(grid.size.x(), grid.size.y(), grid.size.z());
+  data->SetOrigin(grid.origin_mm.data());
+  data->SetSpacing(grid.spacing_mm.data());
+  vtkNew<vtkMatrix3x3> direction;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) direction->SetElement(r, c, grid.direction(r, c));
+  data->SetDirectionMatrix(direction);
+  vtkNew<vtkUnsignedCharArray> tissue;
+  tissue->SetName(label_array);
+  // VTK only reads from the borrowed array.
+  tissue->SetArray(const_cast<std::uint8_t*>(labels.voxels.data()), static_cast<vtkIdType>(labels.voxels.size()), 1);
+  data->GetPointData()->SetScalars(tissue);
+  add_strings(*data, "frame", {"LPS"});
+  add_strings(*data, "unit", {"mm"});
+  vtkNew<vtkStringArray> names;
+  names->SetName("tissue_names");
+  for (const auto name : tissue_names) names->InsertNextValue(std::string(name));
+  data->GetFieldData()->AddArray(names);
+  for (const auto& [key, value] : notes) add_strings(*data, key.c_str(), {value});
+  vtkNew<vtkXMLImageDataWriter> writer;
+  ErrorCollector errors(*writer);
+  writer->SetFileName(file.c_str());
+  writer->SetInputData(data);
+  writer->SetCompressionLevel(1);
+  writer->EncodeAppendedDataOff();
+  const bool written = writer->Write() == 1;
+  writer->RemoveAllObservers();
+  writer->GetExecutive()->RemoveAllObservers();
+  if (!written || !errors.message().empty())
+    throw InputError(fmt::format("{}: cannot be written: {}", file.string(), errors.message()));
+}
+
+LabelImage read_labels(const std::filesystem::path& file) {
+  const ImageFile image = read_image(file, "");
+  LabelImage labels{image.image.grid, std::vector<std::uint8_t>(image.image.voxels.size())};
+  for (std::size_t n = 0; n < labels.voxels.size(); ++n) {
+    const float value = image.image.voxels[n];
+    labels.voxels[n] = static_cast<std::uint8_t>(value);
+    if (value < 0 || value >= tissue_count || labels.voxels[n] != value)
+      throw InputError(
+          fmt::format("{}: value {} of array `{}` is not a tissue (0 to {}); write the file with supine-segment",
+                      file.string(), value, label_array, tissue_count - 1));
+  }
+  return labels;
+}
+
+LabelNotes read_label_notes(const std::filesystem::path& file) {
+  vtkNew<vtkXMLImageDataReader> reader;
+  update(*reader, file);
+  LabelNotes notes;
+  for (const char* key : {"cut", "rim_mm", "side"})
+    if (const auto value = field_string(*reader->GetOutput(), key)) notes[key] = *value;
+  return notes;
+}
+
+}  // namespace supine::segmentation

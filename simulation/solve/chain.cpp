@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/solve/chain.h"
+
+#include <fmt/format.h>
+
+#include "common/error.h"
+#include "simulation/solve/folds.h"
+#include "simulation/solve/pushed_forward.h"
+
+namespace supine::simulation {
+namespace {
+
+constexpr int max_corrections = 60;  // fixed point
+constexpr double correction_tolerance_mm = 1e-3;
+constexpr double second_shape_bound_mm = 1e-3;  // two balanced shapes this close are one
+
+void check_prone_gravity(const PoseLoad& prone, const meshing::Anatomy& anatomy) {
+  const double along = prone.gravity.dot(anatomy.outward);
+  if (along > 0) return;
+  const Eigen::Vector3d& n = anatomy.outward;
+  throw InputError(fmt::format(
+      "pose.prone.gravity = [{:.3f}, {:.3f}, {:.3f}] presses the breast into the muscle, whose outward normal is "
+      "({:.3f}, {:.3f}, {:.3f}): the angle must be under 90 degrees. A prone breast hangs away from the chest: check "
+      "the sign, or case.frame against the frame of the image",
+      prone.gravity.x(), prone.gravity.y(), prone.gravity.z(), n.x(), n.y(), n.z()));
+}
+
+/// Notes smallest det F at the quadrature points and the cells folded in @p x or @p X.
+/// @throws NumericalFailure  naming the cell that is inverted at a quadrature point
+void check_cells(const meshing::TetMesh& mesh, const Points& x, const Points& X, const std::string& what,
+                 SolveReport& report) {
+  Eigen::Index cell = 0;
+  report.min_det_f = cell_det_f_at_points(mesh.cells, x, X).minCoeff(&cell);
+  if (report.min_det_f > 0) return;
+  Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
+  for (int a = 0; a < 4; ++a) centre += 0.25 * x.row(mesh.cells(cell, a));
+  throw NumericalFailure(fmt::format(
+      "{}: cell {} at ({:.1f}, {:.1f}, {:.1f}) mm is turned inside out (det F = {:.3g}); make the mesh finer there or "
+      "raise breast.young_modulus_kpa",
+      what, cell, centre.x(), centre.y(), centre.z(), report.min_det_f));
+}
+
+/// Notes and names the cells of a shape that fold between quadrature points.
+void note_folds(const meshing::TetMesh& mesh, const Points& shape, const std::string& name, SolveReport& report,
+                std::vector<std::string>& warnings) {
+  const Folds folds = find_folds(mesh.cells, shape);
+  report.folded_cells = folds.cells;
+  if (folds.cells > 0) warnings.push_back(folds_warning(name, folds));
+}
+
+Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
+  return {mechanics.mesh(), mechanics.anatomy(), mechanics.layout(), pose};
+}
+
+}  // namespace
+
+Chain::Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
+             std::vector<PoseLoad> poses, SolveOptions options)
+    : poses_(std::move(poses)), mechanics_(mesh, anatomy, model), solver_(mechanics_, std::move(options)) {
+  check_prone_gravity(poses_.at(0), anatomy);
+}
+
+Fields<Dual> Chain::fields(const Model& model, const PoseLoad& pose, const std::string& varied) const {
+  return make_fields(model, scene_of(mechanics_, pose.name), pose.gravity, varied);
+}
+
+void Chain::load(const Model& model, const PoseLoad& pose) { mechanics_.set_fields(values_of(fields(model, pose))); }
+
+ChainSolution Chain::solve(const Model& model, const ChainSolution* near, InverseMethod method) {
+  const meshing::TetMesh& mesh = mechanics_.mesh();
+  solver_.forget();
+  ChainSolution solution;
+  const Eigen::VectorXd offset = values_of(fields(model, poses_[0])).imaged_offset;
+  solution.prone = mesh.points + Eigen::Map<const Points>(offset.data(), mesh.points.rows(), 3);
+  undeformed(model, method, near, solution);
+  check_cells(mesh, solution.prone, solution.X, "undeformed", solution.inverse);
+  note_folds(mesh, solution.X, "undeformed", solution.inverse, solution.warnings);
+  for (std::size_t p = 1; p < poses_.size(); ++p) {
+    load(model, poses_[p]);
+    Points start;
+    if (near != nullptr) start = pushed_forward(mesh.cells, near->poses[p - 1].x, near->X, solution.X);
+    PoseSolution pose{poses_[p].name, {}, {}};
+    pose.report = solver_.forward(solution.X, pose.x, "undeformed → " + pose.name, near != nullptr ? &start : nullptr);
+    check_cells(mesh, pose.x, solution.X, pose.name, pose.report);
+    note_folds(mesh, pose.x, pose.name, pose.report, solution.warnings);
+    solution.poses.push_back(std::move(pose));
+  }
+  return solution;
+}
+
+void Chain::certify(const Model& model, ChainSolution& solution) {
+  solver_.forget();
+  load(model, poses_[0]);
+  solution.round_trip.name = poses_[0].name;
+  solution.round_trip.report = solver_.forward(solution.X, solution.round_trip.x, "undeformed → " + poses_[0].name);
+  const Eigen::VectorXd error = (solution.round_trip.x - solution.prone).rowwise().norm();
+  solution.round_trip_max_mm = error.maxCoeff();
+  solution.round_trip_rms_mm = std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
+  if (!mechanics_.has_energy()) look_for_second_shapes(model, solution);
+}
+
+void Chain::look_for_second_shapes(const Model& model, ChainSolution& solution) {
+  for (std::size_t p = 1; p < poses_.size(); ++p) {
+    PoseSolution& pose = solution.poses[p - 1];
+    load(model, poses_[p]);
+    Points other;
+    try {
+      solver_.forward(solution.X, other, "prone → " + pose.name, &solution.prone);
+    } catch (const NumericalFailure&) {
+      continue;  // that way leads nowhere: no second shape
+    }
+    Eigen::Index node = 0;
+    const double distance = (other - pose.x).rowwise().norm().maxCoeff(&node);
+    if (distance <= second_shape_bound_mm) continue;
+    pose.second_shape_mm = distance;
+    solution.warnings.push_back(fmt::format(
+        "{}: two balanced shapes, {:.2f} mm apart at ({:.1f}, {:.1f}, {:.1f}) mm: one is reached from the undeformed "
+        "shape, the other from the prone one, and forces without an energy (breast.law = corotational_qr, friction) "
+        "cannot say which holds; use breast.law = \"corotational\", or raise breast.young_modulus_kpa",
+        pose.name, distance, pose.x(node, 0), pose.x(node, 1), pose.x(node, 2)));
+  }
+}
+
+void Chain::undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution) {
+  const PoseLoad& prone = poses_[0];
+  if (method == InverseMethod::newton) {
+    load(model, prone);
+    Points start;
+    if (near != nullptr) start = solution.prone + (near->X - near->prone);
+    solution.inverse =
+        solver_.inverse(solution.prone, solution.X, "prone → undeformed", near != nullptr ? &start : nullptr);
+    return;
+  }
+  load(model, {prone.name, -prone.gravity});
+  solution.inverse = solver_.forward(solution.prone, solution.X, "prone → undeformed (reversed gravity)");
+  if (method == InverseMethod::fixed_point) correct(model, solution);
+}
+
+void Chain::correct(const Model& model, ChainSolution& solution) {
+  load(model, poses_[0]);
+  SolveReport& report = solution.inverse;
+  double error = 0;
+  for (int correction = 0; correction < max_corrections; ++correction) {
+    Points x;
+    const SolveReport forward = solver_.forward(solution.X, x, "prone → undeformed (fixed point)");
+    report.newton_iterations += forward.newton_iterations;
+    report.factorisations += forward.factorisations;
+    report.load_steps = forward.load_steps;
+    report.residual_share = forward.residual_share;
+    error = (x - solution.prone).rowwise().norm().maxCoeff();
+    if (error < correction_tolerance_mm) return;
+    solution.X -= x - solution.prone;
+  }
+  throw NumericalFailure(
+      fmt::format("prone → undeformed (fixed point): still {:.3g} mm off after {} corrections (bound {} mm); use "
+                  "--inverse newton",
+                  error, max_corrections, correction_tolerance_mm));
+}
+
+ChainSolution solve_chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
+                          const std::vector<PoseLoad>& poses, InverseMethod method, const SolveOptions& options) {
+  Chain chain(mesh, anatomy, model, poses, options);
+  check_effects_act(model, scene_of(chain.mechanics(), poses.back().name));
+  ChainSolution solution = chain.solve(model, nullptr, method);
+  chain.certify(model, solution);
+  return solution;
+}
+
+double load_number(const meshing::Anatomy& anatomy, const Model& model) {
+  return model.breast.density_kg_m3.value * 1e-9 * gravity_mm_s2 * anatomy.mound_height_mm /
+         model.breast.young_modulus_kpa.value;
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulation/solve/equilibrium.h"
+#include "simulation/solve/linear_solver.h"
+
+namespace supine::simulation {
+
+/// How the undeformed shape is found. newton is the true inverse; the others are kept to be compared with:
+/// fixed_point corrects X by the forward error until it is small (Sellier 2011), reversed_gravity loads the imaged
+/// shape, taken as stress-free, with gravity turned round.
+enum class InverseMethod { newton, fixed_point, reversed_gravity };
+
+/// A body position to predict.
+struct PoseLoad {
+  std::string name;
+  Eigen::Vector3d gravity;  ///< unit, LPS
+};
+
+struct PoseSolution {
+  std::string name;
+  Points x;  ///< mm
+  SolveReport report;
+  /// Largest distance to another balanced shape, that the solver reaches from the prone one; 0 where there is none.
+  /// Looked for by Chain::certify() and only where forces have no energy (corotational_qr, friction): with one, the
+  /// solver goes downhill.
+  double second_shape_mm = 0;
+};
+
+struct ChainSolution {
+  Points prone;  ///< the known shape: imaged nodes, moved by what the model says of the segmentation; mm
+  Points X;      ///< undeformed shape, mm
+  SolveReport inverse;
+  std::vector<PoseSolution> poses;  ///< all but prone, in the order given
+  PoseSolution round_trip;          ///< prone again, from X and no load; filled by Chain::certify()
+  double round_trip_max_mm = 0;     ///< its largest distance to the known shape
+  double round_trip_rms_mm = 0;
+  std::vector<std::string> warnings;  ///< what a user must know of the answer
+};
+
+/// prone (imaged) → undeformed → every other pose, for one mesh and one kind of model (laws, boundary kinds), as often
+/// as wanted with other numbers and effects. Symbolic work and memory are kept between solves.
+class Chain {
+ public:
+  /// @param mesh, anatomy  of the imaged shape; must outlive the object
+  /// @param poses  the first one is prone, the imaged pose
+  /// @throws InputError  prone gravity that points into the muscle (bound: the angle to the muscle's outward normal is
+  ///   under 90°); what Mechanics refuses
+  Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model, std::vector<PoseLoad> poses,
+        SolveOptions options = {});
+
+  const Mechanics& mechanics() const { return mechanics_; }
+  const std::vector<PoseLoad>& poses() const { return poses_; }
+
+  /// @param model  of the kind given to the constructor: numbers and effects may differ
+  /// @param near   solution for similar numbers to start from, or nullptr to start from the imaged shape and no load;
+  ///   when that fails it starts without
+  /// @throws NumericalFailure  naming the pose
+  ChainSolution solve(const Model& model, const ChainSolution* near = nullptr,
+                      InverseMethod method = InverseMethod::newton);
+
+  /// Makes the round trip: loads solution.X with prone gravity, from no load. Where forces have no energy it also looks
+  /// for a second balanced shape of every pose.
+  void certify(const Model& model, ChainSolution& solution);
+
+  /// Fields of one pose with the derivative with respect to @p varied (make_fields).
+  Fields<Dual> fields(const Model& model, const PoseLoad& pose, const std::string& varied = {}) const;
+
+ private:
+  friend class Sensitivities;
+  void load(const Model& model, const PoseLoad& pose);
+  void undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
+  void correct(const Model& model, ChainSolution& solution);
+  void look_for_second_shapes(const Model& model, ChainSolution& solution);
+
+  std::vector<PoseLoad> poses_;
+  Mechanics mechanics_;
+  EquilibriumSolver solver_;
+  // Of Sensitivities that are gone: analysed once, ready for the next.
+  std::vector<std::unique_ptr<CholeskySolver>> spare_cholesky_;
+  std::vector<std::unique_ptr<LuSolver>> spare_lu_;
+};
+
+/// A chain used once, with its round trip and with effects that can change nothing refused.
+ChainSolution solve_chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
+                          const std::vector<PoseLoad>& poses, InverseMethod method = InverseMethod::newton,
+                          const SolveOptions& options = {});
+
+/// ρ g H / E: how far the tissue's weight outdoes its stiffness; above about 2 shapes hardly carry themselves.
+double load_number(const meshing::Anatomy& anatomy, const Model& model);
+
+}  // namespace supine::simulation

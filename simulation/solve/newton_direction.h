@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <memory>
+
+#include "simulation/mechanics.h"
+#include "simulation/solve/krylov.h"
+#include "simulation/solve/spd_solver.h"
+
+namespace supine::simulation {
+
+/// Newton steps for one Mechanics: solves ∂r/∂x s = -r or ∂r/∂X s = -r.
+///
+/// One factor of ∂r/∂x (or, on large meshes, one multigrid hierarchy) is kept and used as preconditioner for as long as
+/// Krylov iterations with it are cheaper than a new one. Where ∂r/∂x is not positive definite a changed one that is
+/// gets factorised, and close to the answer conjugate gradients with it on ∂r/∂x itself find the step, up to where they
+/// meet a direction of negative curvature: the changed tangent alone is too stiff and creeps. -∂r/∂X is close to
+/// ∂r/∂x F (moving a point of the body together with its place leaves what is balanced balanced), so the same factor
+/// serves the inverse solve, whose matrix is not symmetric and would cost three times as much to factorise.
+class NewtonDirection {
+ public:
+  explicit NewtonDirection(const Mechanics& mechanics);
+
+  /// Step for the deformed shape. @p sums holds residual and tangent at @p state; they are evaluated again with
+  /// Demand::convex where the tangent is not positive definite.
+  /// @param tolerance  of the linear solve, relative to |r|
+  /// @param moved_mm   how far the last step went: what says whether the kept factor is still close
+  /// @return false when no step was found
+  bool deformed(const State& state, double tolerance, double moved_mm, Sums& sums, Eigen::VectorXd& step);
+
+  /// Step for the undeformed shape. @p sums holds residual and reference tangent at @p state.
+  bool undeformed(const State& state, double tolerance, Sums& sums, Eigen::VectorXd& step);
+
+  /// How far the kept factor would move the nodes to take @p residual away, mm: root of the sum of squares. The measure
+  /// of progress that does not depend on how stiff a body is in which direction (Deuflhard, Newton Methods for
+  /// Nonlinear Problems, 2004, section 3.3); not a number without a factor.
+  double natural_mm(const Eigen::VectorXd& residual);
+
+  /// Forgets the kept factor, so that what follows does not depend on what was solved before.
+  void forget() { have_factor_ = false, shift_ = 0; }
+
+  /// Whether the last step came from the exact tangent: its length then says how far the answer is.
+  bool exact() const { return exact_; }
+  int factorisations() const { return factorisations_; }
+
+ private:
+  bool factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step);
+  bool step_with_new_factor(const State& state, double tolerance, double shift, bool close, Sums& sums,
+                            Eigen::VectorXd& step);
+  bool by_conjugate_gradients(double tolerance, double shift, int most, const Sums& sums, Eigen::VectorXd& step);
+  bool by_gmres(const SparseMatrix& matrix, const LinearMap& preconditioner, double tolerance, const Sums& sums,
+                Eigen::VectorXd& step);
+  int worth_of_factor(int least, int most) const;  // Krylov iterations that cost as much as a new factor, cut at both
+
+  const Mechanics& mechanics_;
+  std::unique_ptr<SpdSolver> factor_;
+  Krylov krylov_;
+  Eigen::VectorXd natural_;  // work space
+  bool have_factor_ = false;
+  bool outworn_ = false;  // the last Krylov solve cost more than a new factor would
+  bool exact_ = true;
+  bool bent_ = false;  // this step's exact tangent has shown negative curvature: it has no Cholesky factor
+  double shift_ = 0;   // of the tangent that was factorised last when the exact one was not positive definite
+  int factorisations_ = 0;
+};
+
+}  // namespace supine::simulation

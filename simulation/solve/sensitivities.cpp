@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/solve/sensitivities.h"
+
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "common/error.h"
+#include "simulation/parameters.h"
+#include "simulation/solve/linear_solver.h"
+
+namespace supine::simulation {
+namespace {
+
+using Flat = Eigen::VectorXd;
+
+Flat flat(const Points& points) { return Eigen::Map<const Flat>(points.data(), points.size()); }
+
+Points shaped(const Flat& values) { return Eigen::Map<const Points>(values.data(), values.size() / 3, 3); }
+
+template <class Solver>
+using Spare = std::vector<std::unique_ptr<Solver>>;
+
+/// A solver taken from @p spare, or a new one; given back when it goes.
+template <class Solver>
+class Lent {
+ public:
+  Lent(Spare<Solver>& spare, const SparseMatrix& pattern) : spare_(spare) {
+    if (spare.empty()) {
+      solver_ = std::make_unique<Solver>(pattern);
+    } else {
+      solver_ = std::move(spare.back());
+      spare.pop_back();
+    }
+  }
+  ~Lent() { spare_.push_back(std::move(solver_)); }
+  Lent(const Lent&) = delete;
+  Lent& operator=(const Lent&) = delete;
+  Solver* operator->() const { return solver_.get(); }
+
+ private:
+  Spare<Solver>& spare_;
+  std::unique_ptr<Solver> solver_;
+};
+
+/// K of one pose, factorised: Cholesky where there is an energy, LU where there is none.
+class TangentSolver {
+ public:
+  TangentSolver(Spare<CholeskySolver>& spare_cholesky, Spare<LuSolver>& spare_lu, bool has_energy,
+                const SparseMatrix& tangent, const std::string& pose) {
+    bool done = false;
+    if (has_energy) done = cholesky_.emplace(spare_cholesky, tangent)->factorise(tangent);
+    if (!done) {
+      cholesky_.reset();
+      done = lu_.emplace(spare_lu, tangent)->factorise(tangent);
+    }
+    if (!done) throw NumericalFailure("the tangent at the solution of '" + pose + "' is singular: no sensitivities");
+  }
+  Flat solve(const Flat& b) const { return cholesky_ ? (*cholesky_)->solve(b) : (*lu_)->solve(b); }
+  Flat solve_transposed(const Flat& b) const {
+    return cholesky_ ? (*cholesky_)->solve(b) : (*lu_)->solve_transposed(b);
+  }
+
+ private:
+  std::optional<Lent<CholeskySolver>> cholesky_;
+  std::optional<Lent<LuSolver>> lu_;
+};
+
+}  // namespace
+
+struct Sensitivities::State {
+  Chain& chain;
+  Model model;
+  ChainSolution solution;
+  Sums sums;
+  SparseMatrix prone_tangent;  // ∂r/∂x of prone: what moving the known shape does
+  std::optional<Lent<LuSolver>> inverse;
+  std::vector<std::unique_ptr<TangentSolver>> tangents;  // per pose but prone
+  std::vector<SparseMatrix> reference_tangents;          // ∂r/∂X, per pose but prone
+
+  State(Chain& c, const Model& m, const ChainSolution& s)
+      : chain(c), model(m), solution(s), sums(c.mechanics().pattern()) {}
+
+  simulation::State at(std::size_t pose) const {  // 0 is prone
+    return {pose == 0 ? solution.prone : solution.poses[pose - 1].x, solution.X, 1.0};
+  }
+
+  void linearise(std::size_t pose) {
+    chain.load(model, chain.poses()[pose]);
+    chain.mechanics().evaluate(at(pose), Demand{.residual = true, .tangent = true, .reference_tangent = true}, sums);
+  }
+
+  /// ∂r/∂p of a pose with x and X held, and what moving the known shape does to its mass.
+  Flat force_derivative(std::size_t pose, const std::string& parameter, Points* prone_derivative) {
+    const Fields<Dual> fields = chain.fields(model, chain.poses()[pose], parameter);
+    chain.mechanics_.set_fields(values_of(fields));
+    const Points imaged = shaped(derivatives_of(fields).imaged_offset);
+    chain.mechanics().parameter_derivative(at(pose), fields, sums);
+    if (prone_derivative != nullptr) *prone_derivative = imaged;
+    return sums.residual;
+  }
+};
+
+Sensitivities::Sensitivities(Chain& chain, const Model& model, const ChainSolution& solution)
+    : state_(std::make_unique<State>(chain, model, solution)) {
+  State& s = *state_;
+  s.linearise(0);
+  s.prone_tangent = s.sums.tangent;
+  if (!s.inverse.emplace(chain.spare_lu_, s.sums.reference_tangent)->factorise(s.sums.reference_tangent))
+    throw NumericalFailure("the tangent of the undeformed shape is singular: no sensitivities");
+  for (std::size_t p = 1; p < chain.poses().size(); ++p) {
+    s.linearise(p);
+    s.reference_tangents.push_back(s.sums.reference_tangent);
+    s.tangents.push_back(std::make_unique<TangentSolver>(
+        chain.spare_cholesky_, chain.spare_lu_, chain.mechanics().has_energy(), s.sums.tangent, chain.poses()[p].name));
+  }
+}
+
+Sensitivities::~Sensitivities() = default;
+
+ChainDerivative Sensitivities::of(const std::string& parameter) const {
+  State& s = *state_;
+  ChainDerivative result;
+  Flat force = s.force_derivative(0, parameter, &result.prone);
+  const Flat prone = flat(result.prone);
+  if (!prone.isZero(0)) force += s.prone_tangent * prone;
+  const Flat undeformed = -(*s.inverse)->solve(force);
+  result.X = shaped(undeformed);
+  for (std::size_t p = 1; p < s.chain.poses().size(); ++p) {
+    const Flat pull = s.force_derivative(p, parameter, nullptr) + s.reference_tangents[p - 1] * undeformed;
+    result.poses.push_back(shaped(-s.tangents[p - 1]->solve(pull)));
+  }
+  return result;
+}
+
+Eigen::VectorXd Sensitivities::gradient(const std::vector<Points>& by_pose,
+                                        const std::vector<std::string>& parameters) const {
+  State& s = *state_;
+  // dJ/dp = -Σ λ_sᵀ ∂r_s/∂p - λ_pᵀ (∂r_p/∂p + K_p dx_p/dp), K_sᵀ λ_s = ∂J/∂x_s, L_pᵀ λ_p = -Σ L_sᵀ λ_s.
+  std::vector<Flat> adjoint(s.chain.poses().size());
+  Flat pull = Flat::Zero(s.solution.X.size());
+  for (std::size_t p = 1; p < adjoint.size(); ++p) {
+    adjoint[p] = s.tangents[p - 1]->solve_transposed(flat(by_pose.at(p - 1)));
+    pull -= s.reference_tangents[p - 1].transpose() * adjoint[p];
+  }
+  adjoint[0] = (*s.inverse)->solve_transposed(pull);
+  Eigen::VectorXd gradient(parameters.size());
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    Points prone;
+    Flat force = s.force_derivative(0, parameters[i], &prone);
+    if (!prone.isZero(0)) force += s.prone_tangent * flat(prone);
+    double slope = -adjoint[0].dot(force);
+    for (std::size_t p = 1; p < adjoint.size(); ++p)
+      slope -= adjoint[p].dot(s.force_derivative(p, parameters[i], nullptr));
+    gradient[static_cast<Eigen::Index>(i)] = slope;
+  }
+  return gradient;
+}
+
+}  // namespace supine::simulation

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "simulation/solve/chain.h"
+
+namespace supine::simulation {
+
+/// What one parameter moves, per unit of it.
+struct ChainDerivative {
+  Points prone;               ///< of the known shape, mm per unit; zero unless the parameter moves the imaged skin
+  Points X;                   ///< of the undeformed shape
+  std::vector<Points> poses;  ///< of every pose, in the order of ChainSolution::poses
+};
+
+/// Exact derivatives of a solved chain with respect to any parameter of the base model or the catalogue, whether its
+/// effect is in the model or not (then at its null), through both solves:
+///   L_p dX/dp = -(∂r_p/∂p + K_p dx_p/dp),   K_s dx_s/dp = -(∂r_s/∂p + L_s dX/dp),
+/// L = ∂r/∂X, K = ∂r/∂x, p prone, s another pose. One factorisation per pose when made, one back-substitution per pose
+/// and parameter after that.
+class Sensitivities {
+ public:
+  /// @param solution  of @p model by @p chain. The chain must outlive the object, which lends it analysed solvers.
+  /// @throws NumericalFailure  a pose at which the tangent is singular
+  Sensitivities(Chain& chain, const Model& model, const ChainSolution& solution);
+  ~Sensitivities();
+
+  /// @param parameter  as in parameters.h, for example "ligament.stiffness_kpa_per_mm"
+  /// @throws InputError  no such parameter
+  ChainDerivative of(const std::string& parameter) const;
+
+  /// Gradient of a scalar J(x of every pose) by the adjoint method: two back-substitutions in all, whatever the number
+  /// of parameters.
+  /// @param by_pose  ∂J/∂x of each pose, in the order of ChainSolution::poses, per mm
+  Eigen::VectorXd gradient(const std::vector<Points>& by_pose, const std::vector<std::string>& parameters) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace supine::simulation

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+// supine-phantom as a program: same bytes, nothing told, bad input; and a null that is calibrated back to its truth.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "phantom/cause.h"
+#include "tests/pipeline/process.h"
+#include "tests/pipeline/temporary_folder.h"
+
+namespace supine::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Words = std::vector<std::string>;
+
+Finished phantom(const fs::path& folder, const Words& options) {
+  Words command = {tool("phantom"), "-o", folder.string(), "--rings", "5", "--order", "1", "--voxel-mm", "3"};
+  command.insert(command.end(), options.begin(), options.end());
+  return run_process(command);
+}
+
+TEST(PhantomTool, SameSeedSameBytes) {
+  TemporaryFolder one, two;
+  for (const TemporaryFolder* folder : {&one, &two}) {
+    const Finished made = phantom(*folder / "case-001", {"--effect", "ligament", "--seed", "5", "--tilt", "--threads",
+                                                         folder == &one ? "1" : "2"});
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  const auto files = files_in(one / "case-001");
+  EXPECT_EQ(files, files_in(two / "case-001"));
+  EXPECT_EQ(files.size(), 8u);
+  for (const std::string& file : files)
+    EXPECT_EQ(read_text(one.path() / "case-001" / file), read_text(two.path() / "case-001" / file)) << file;
+  Json answers[] = {Json::parse(read_text(one / "answers/case-001.json")),
+                    Json::parse(read_text(two / "answers/case-001.json"))};
+  for (Json& answer : answers) answer.erase("timing");
+  EXPECT_EQ(answers[0], answers[1]);
+  EXPECT_EQ(answers[0]["causes"][0]["name"], "ligament");
+}
+
+// Whatever is missing: the same files, the same case.toml and model.toml to the byte, and no cause's name in any.
+TEST(PhantomTool, CaseFolderTellsNothing) {
+  TemporaryFolder folder;
+  ASSERT_EQ(phantom(folder / "null/case-001", {"--effect", "null", "--seed", "6"}).code, 0);
+  ASSERT_EQ(phantom(folder / "two/case-001", {"--effect", "gland_stiffness", "--effect", "creep", "--seed", "6"}).code,
+            0);
+  ASSERT_EQ(phantom(folder / "odd/case-001", {"--outside", "coil_contact", "--seed", "6"}).code, 0);
+  const auto files = files_in(folder / "null/case-001");
+  for (const char* other : {"two", "odd"}) {
+    const fs::path other_case = folder.path() / other / "case-001";
+    EXPECT_EQ(files_in(other_case), files);
+    for (const char* file : {"case.toml", "model.toml"})
+      EXPECT_EQ(read_text(other_case / file), read_text(folder.path() / "null/case-001" / file));
+    for (const std::string& file : files)
+      for (const auto& names :
+           {phantom::catalogue_causes(), phantom::outside_causes(), Words{"seed", "null", "answer"}})
+        for (const std::string& name : names)
+          EXPECT_EQ(read_text(other_case / file).find(name), std::string::npos) << file << " says " << name;
+    const auto differs = [&](const char* file) {
+      return read_text(other_case / file) != read_text(folder.path() / "null/case-001" / file);
+    };
+    EXPECT_TRUE(differs("labels.nrrd") || differs("supine.ply"));
+    EXPECT_TRUE(fs::exists(folder.path() / other / "answers/case-001.json"));
+  }
+}
+
+struct BadCall {
+  Words options;
+  std::string says;
+};
+
+TEST(PhantomTool, RefusesInOneMessageAndWritesNothing) {
+  TemporaryFolder folder;
+  const std::string inside = (folder / "case-001/answer.json").string();
+  for (const BadCall& bad :
+       {BadCall{{"--effect", "gremlins"}, "no cause 'gremlins'"},
+        BadCall{{"--effect", "null", "--effect", "creep"}, "null"}, BadCall{{"--noise-mm", "-1"}, "noise_mm"},
+        BadCall{{"--answer", inside}, "lies in the case folder"},
+        BadCall{{"--answer", (folder / "answer.txt").string()}, ".json"}, BadCall{{"--effect", "scar"}, "--outside"}}) {
+    const Finished finished = phantom(folder / "case-001", bad.options);
+    EXPECT_EQ(finished.code, 2) << finished.err;
+    expect_words(finished.err, {"supine-phantom: error: ", bad.says});
+    EXPECT_TRUE(files_in(folder.path()).empty());
+  }
+  const Finished nowhere = run_process({tool("phantom"), "--effect", "null"});
+  EXPECT_EQ(nowhere.code, 2);
+  expect_words(nowhere.err, {"-o"});
+}
+
+TEST(PhantomTool, OverwritesOnlyWhenForced) {
+  TemporaryFolder folder;
+  ASSERT_EQ(phantom(folder / "case-001", {"--seed", "7"}).code, 0);
+  const std::string before = read_text(folder / "case-001/supine.ply");
+  EXPECT_EQ(phantom(folder / "case-001", {"--seed", "8"}).code, 2);
+  EXPECT_EQ(read_text(folder / "case-001/supine.ply"), before);
+  EXPECT_EQ(phantom(folder / "case-001", {"--seed", "8", "--force"}).code, 0);
+  EXPECT_NE(read_text(folder / "case-001/supine.ply"), before);
+}
+
+// The whole way on a null: what calibration says of the moduli holds the truth.
+TEST(PhantomTool, CalibratedNullComesBackToItsModuli) {
+  TemporaryFolder folder;
+  const fs::path made = folder / "case-001", out = folder / "out";
+  const Finished finished =
+      run_process({tool("phantom"), "--effect", "null", "--seed", "1", "--rings", "7", "--voxel-mm", "2", "-o", made});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const Finished calibrated =
+      run_process({"make", "-f", std::string(SUPINE_SOURCE_DIR) + "/pipeline/Makefile", "BIN=" SUPINE_BIN_DIR,
+                   "CASE=" + made.string(), "OUT=" + out.string(), "TRIANGLES=1500", (out / "model.toml").string()});
+  ASSERT_EQ(calibrated.code, 0) << calibrated.err;
+  const Json truth = Json::parse(read_text(folder / "answers/case-001.json"))["base"];
+  const Json fitted = Json::parse(read_text(out / "calibration.json"));
+  ASSERT_EQ(fitted["parameters"].size(), truth.size());
+  for (const Json& row : fitted["parameters"]) {
+    const double value = truth.at(row["name"].get<std::string>());
+    EXPECT_LE(row["interval95"][0].get<double>(), value) << row["name"];
+    EXPECT_GE(row["interval95"][1].get<double>(), value) << row["name"];
+    EXPECT_NEAR(row["value"].get<double>(), value, 0.3 * value) << row["name"];
+  }
+  // Nothing is missing: what is left are 0.7 mm of noise and what linear elements of 1,500 triangles err, 0.6 mm.
+  EXPECT_LT(fitted["rms_mm"].get<double>(), 1.0);
+}
+
+}  // namespace
+}  // namespace supine::pipeline

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/case/case.h"
+
+#include <vector>
+
+#include "tests/pipeline/temporary_folder.h"
+
+namespace supine::pipeline {
+namespace {
+
+using segmentation::Tissue;
+
+const std::string good = R"([case]
+name = "phantom"
+frame = "LPS"
+side = "left"
+
+[image]
+file = "labels.nrrd"
+kind = "labels"
+cut = ["excluded", "rim"]
+rim_mm = 8
+[image.labels]
+air = [0]
+adipose = [1]
+gland = [29, 95, 125]
+muscle = [40]
+
+[pose.prone]
+gravity = [0.0, -1.0, 0.0]
+[pose.tilt45]
+gravity = [0.0, 0.6, -0.8]
+[pose.supine]
+gravity = [0.6, 0.8, 0.0]
+surface = "supine.ply"
+noise_mm = 0.7
+landmarks = "supine_landmarks.csv"
+
+[landmarks]
+prone = "prone_landmarks.csv"
+[calibration]
+poses = ["supine"]
+)";
+
+class CaseFile : public testing::Test {
+ protected:
+  CaseFile() {
+    for (const char* name : {"labels.nrrd", "supine.ply", "supine_landmarks.csv", "prone_landmarks.csv"})
+      write_text(folder_ / name, "x");
+  }
+  Case read(const std::string& text) {
+    write_text(folder_ / "case.toml", text);
+    return read_case(folder_.path());
+  }
+  /// What is said about the good case with @p from replaced by @p to.
+  std::string complaint(const std::string& from, const std::string& to) {
+    return input_error([&] { read(replaced(good, from, to)); });
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(CaseFile, EveryKeyArrives) {
+  const Case c = read(good);
+  EXPECT_EQ(c.name, "phantom");
+  EXPECT_EQ(c.side, "left");
+  EXPECT_EQ(c.image_kind, "labels");
+  EXPECT_TRUE(c.cut.excluded);
+  EXPECT_FALSE(c.cut.edge);
+  EXPECT_TRUE(c.cut.rim);
+  EXPECT_EQ(c.cut.rim_mm, 8);
+  EXPECT_EQ(c.labels.size(), 6u);
+  EXPECT_EQ(c.labels.at(95), Tissue::gland);
+  EXPECT_EQ(c.image_file, folder_ / "labels.nrrd");
+  EXPECT_EQ(c.prone_landmarks, folder_ / "prone_landmarks.csv");
+  EXPECT_EQ(c.pose("supine").noise_mm, 0.7);
+  EXPECT_EQ(c.pose("supine").surface, folder_ / "supine.ply");
+  EXPECT_FALSE(c.pose("tilt45").surface);
+}
+
+TEST_F(CaseFile, ProneComesFirstAndSupineSecond) {
+  const Case c = read(good);
+  ASSERT_EQ(c.poses.size(), 3u);
+  EXPECT_EQ(c.poses[0].name, "prone");
+  EXPECT_EQ(c.poses[1].name, "supine");
+  EXPECT_EQ(c.poses[2].name, "tilt45");
+}
+
+TEST_F(CaseFile, FurtherPosesKeepTheOrderOfTheFile) {
+  const Case c = read(good + "[pose.upright]\ngravity = [0, 0, -1]\n[pose.a_side]\ngravity = [1, 0, 0]\n");
+  ASSERT_EQ(c.poses.size(), 5u);
+  EXPECT_EQ(c.poses[2].name, "tilt45");
+  EXPECT_EQ(c.poses[3].name, "upright");
+  EXPECT_EQ(c.poses[4].name, "a_side");
+}
+
+TEST_F(CaseFile, GravityInRasBecomesLps) {
+  const Case c = read(replaced(good, "frame = \"LPS\"", "frame = \"RAS\""));
+  EXPECT_TRUE(c.pose("supine").gravity.isApprox(Eigen::Vector3d(-0.6, -0.8, 0.0), 1e-12));
+  EXPECT_TRUE(c.pose("tilt45").gravity.isApprox(Eigen::Vector3d(0.0, -0.6, -0.8), 1e-12));
+}
+
+TEST_F(CaseFile, GravityWithinTheToleranceIsNormalised) {
+  const Case c = read(replaced(good, "[0.6, 0.8, 0.0]", "[0.6004, 0.8004, 0.0]"));
+  EXPECT_NEAR(c.pose("supine").gravity.norm(), 1, 1e-15);
+}
+
+TEST_F(CaseFile, TheSharedCasesAreRead) {
+  const std::filesystem::path shared = std::filesystem::path(SUPINE_SHARED_DATA) / "hidden-open" / "ligament-1";
+  if (!std::filesystem::exists(shared)) GTEST_SKIP() << "shared data not there: " << shared;
+  const Case c = read_case(shared);
+  EXPECT_EQ(c.poses.size(), 3u);
+  EXPECT_TRUE(c.cut.excluded);
+}
+
+TEST_F(CaseFile, TheSamplesAreRead) {
+  for (const char* name : {"ligament", "phantom"})
+    EXPECT_EQ(read_case(std::filesystem::path(SUPINE_SOURCE_DIR) / "samples" / name).name, name);
+}
+
+struct BadCase {
+  const char *name, *from, *to;
+  std::vector<std::string> words;
+};
+
+void PrintTo(const BadCase& bad, std::ostream* out) { *out << bad.from << " -> " << bad.to; }
+
+class BadCaseFile : public CaseFile, public testing::WithParamInterface<BadCase> {};
+
+TEST_P(BadCaseFile, IsRefusedWithPlaceValueAndBound) {
+  const std::string message = complaint(GetParam().from, GetParam().to);
+  expect_words(message, {"case.toml"});
+  expect_words(message, GetParam().words);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, BadCaseFile,
+    testing::Values(
+        BadCase{"NotToml", "[case]", "[case", {":1:", "not valid TOML"}},
+        BadCase{"UnknownKey", "side =", "sied =", {":4", "[case] sied", "unknown key", "did you mean side?"}},
+        BadCase{"UnknownFrame",
+                "kind = \"labels\"",
+                "kind = \"labels\"\nframe = \"ALP\"",
+                {":9", "[image] frame", "ALP", "three letters"}},
+        BadCase{"UnknownTable", "[landmarks]", "[landmark]", {"landmark:", "did you mean landmarks?"}},
+        BadCase{"KeyTwice", "name = \"phantom\"", "name = \"a\"\nname = \"b\"", {":3"}},
+        BadCase{"NoName", "name = \"phantom\"", "", {"[case] name", "missing"}},
+        BadCase{"NoSide", "side = \"left\"", "", {"[case] side", "missing"}},
+        BadCase{"WrongSide", "\"left\"", "\"lefft\"", {":4", "\"lefft\"", "left, right or both", "did you mean left?"}},
+        BadCase{"WrongFrame", "\"LPS\"", "\"LPI\"", {"frame", "LPI", "LPS or RAS"}},
+        BadCase{"NameIsANumber", "\"phantom\"", "7", {"name = 7", "text in quotes"}},
+        BadCase{"NoImage",
+                "[image]\nfile = \"labels.nrrd\"\nkind = \"labels\"\ncut = [\"excluded\", \"rim\"]\nrim_mm = "
+                "8\n[image.labels]\nair = [0]\nadipose = [1]\ngland = [29, 95, 125]\nmuscle = [40]\n",
+                "",
+                {"[image]", "missing"}},
+        BadCase{"ImageNotThere",
+                "file = \"labels.nrrd\"",
+                "file = \"volume.nrrd\"",
+                {":7", "file = \"volume.nrrd\"", "is not there"}},
+        BadCase{"UnknownKind", "kind = \"labels\"", "kind = \"ct\"", {"kind = \"ct\"", "labels or mri"}},
+        BadCase{"NoLabels",
+                "[image.labels]\nair = [0]\nadipose = [1]\ngland = [29, 95, 125]\nmuscle = [40]\n",
+                "",
+                {"[image.labels]", "missing"}},
+        BadCase{"UnknownTissue", "adipose =", "adpose =", {"[image.labels] adpose", "did you mean adipose?"}},
+        BadCase{"LabelTwice", "[29, 95, 125]", "[29, 40, 1]", {"label value 1", "adipose"}},
+        BadCase{"EmptyLabel", "[29, 95, 125]", "[]", {"gland", "lists no label value"}},
+        BadCase{"LabelIsNotWhole", "[29, 95, 125]", "[29.5]", {"gland", "whole numbers"}},
+        BadCase{"LabelIsNoList", "muscle = [40]", "muscle = 40", {"muscle = 40", "list"}},
+        BadCase{"NoMuscle", "muscle = [40]", "", {"muscle", "missing"}},
+        BadCase{"NoSoftTissue", "adipose = [1]\ngland = [29, 95, 125]", "", {"soft tissue"}},
+        BadCase{"UnknownCut", "\"excluded\", \"rim\"", "\"excluded\", \"edges\"", {"edges", "excluded, edge or rim"}},
+        BadCase{"RimWithoutRim", "\"excluded\", \"rim\"", "\"excluded\"", {"rim_mm = 8", "no effect"}},
+        BadCase{"RimNotPositive", "rim_mm = 8", "rim_mm = 0", {"rim_mm = 0", "> 0 mm"}},
+        BadCase{"RecipeForLabels", "[landmarks]", "[segmentation]\n[landmarks]", {"segmentation", "kind"}},
+        BadCase{"GravityZero", "[0.6, 0.8, 0.0]", "[0, 0, 0]", {"[pose.supine] gravity", "is zero"}},
+        BadCase{"GravityNotUnit",
+                "[0.6, 0.8, 0.0]",
+                "[0.0, 9.81, 0.0]",
+                {"[pose.supine]", "length 1", "9.81", "[0.000000, 1.000000, 0.000000]"}},
+        BadCase{"GravityTwoNumbers", "[0.6, 0.8, 0.0]", "[0.6, 0.8]", {"three numbers"}},
+        BadCase{"GravityNotANumber", "[0.6, 0.8, 0.0]", "[0.6, 0.8, nan]", {"gravity", "finite"}},
+        BadCase{"GravityMissing", "gravity = [0.6, 0.8, 0.0]\n", "", {"[pose.supine] gravity", "missing"}},
+        BadCase{"GravityTheSame",
+                "[0.6, 0.8, 0.0]",
+                "[0.0, -1.0, 0.0001]",
+                {"[pose.supine]", "same direction", "[pose.prone]"}},
+        BadCase{"NoSupine", "[pose.supine]", "[pose.lying]", {"[pose.supine]", "missing"}},
+        BadCase{"PoseWithSlash", "[pose.tilt45]", "[pose.\"../tilt\"]", {"../tilt", "letters"}},
+        BadCase{"PoseNamedLikeAFile", "[pose.tilt45]", "[pose.undeformed]", {"undeformed", "another"}},
+        BadCase{"ScanNotThere", "\"supine.ply\"", "\"scan.ply\"", {"surface = \"scan.ply\"", "is not there"}},
+        BadCase{"ScanIsAFolder", "\"supine.ply\"", "\".\"", {"is a folder"}},
+        BadCase{"NoiseNotPositive", "noise_mm = 0.7", "noise_mm = -0.7", {"noise_mm = -0.7", "> 0 mm"}},
+        BadCase{"LandmarksWithoutProne", "prone = \"prone_landmarks.csv\"", "", {"[pose.supine] landmarks", "prone"}},
+        BadCase{"CalibratedPoseUnknown", "poses = [\"supine\"]", "poses = [\"upright\"]", {"poses", "[pose.upright]"}},
+        BadCase{"CalibratedPoseHasNoScan",
+                "poses = [\"supine\"]",
+                "poses = [\"tilt45\"]",
+                {"[pose.tilt45]", "no surface"}}),
+    [](const auto& place) { return place.param.name; });
+
+TEST_F(CaseFile, AFolderThatIsNotThereIsNamed) {
+  expect_words(input_error([] { read_case("/no/such/case"); }), {"/no/such/case", "not there"});
+}
+
+TEST_F(CaseFile, AFolderWithoutCaseFileIsNamed) {
+  expect_words(input_error([&] { read_case(folder_.path()); }), {"case.toml", "is not there"});
+}
+
+TEST_F(CaseFile, AFileInsteadOfAFolderIsNamed) {
+  expect_words(input_error([&] { read_case(folder_ / "labels.nrrd"); }), {"labels.nrrd", "not a folder"});
+}
+
+TEST_F(CaseFile, AnUnknownPoseListsThoseThereAre) {
+  const Case c = read(good);
+  expect_words(input_error([&] { c.pose("upright"); }), {"upright", "prone, supine or tilt45"});
+}
+
+}  // namespace
+}  // namespace supine::pipeline

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/case/model_edit.h"
+
+#include "pipeline/case/model_file.h"
+#include "tests/pipeline/temporary_folder.h"
+
+namespace supine::pipeline {
+namespace {
+
+const std::string base = "# my notes\n[breast]\nyoung_modulus_kpa = 0.5  # from the clinic\n";
+
+class ModelEdit : public testing::Test {
+ protected:
+  std::filesystem::path file(const std::string& text) {
+    write_text(folder_ / "model.toml", text);
+    return folder_ / "model.toml";
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(ModelEdit, AddingKeepsEveryByteBefore) {
+  const std::string text = with_effect(file(base), "ligament");
+  EXPECT_EQ(text.substr(0, base.size()), base);
+}
+
+TEST_F(ModelEdit, EveryEffectOfTheCatalogueCanBeAddedReadAndRemoved) {
+  for (const simulation::Effect* effect : simulation::catalogue()) {
+    const auto path = file(with_effect(file(base), effect->name()));
+    const simulation::Model model = read_model(path);
+    ASSERT_EQ(model.effects.size(), 1u) << effect->name();
+    bool any_free = false;
+    for (const auto& [key, setting] : model.effects[0].parameters) any_free |= setting.free;
+    EXPECT_TRUE(any_free) << effect->name();
+    EXPECT_EQ(without_effect(path, effect->name()), base) << effect->name();
+  }
+}
+
+TEST_F(ModelEdit, StrengthAndPlaceOfAnAddedEffectAreFreeAboutTheirUsualValues) {
+  const simulation::Model model = read_model(file(with_effect(file(base), "ligament")));
+  for (const simulation::Parameter& row : simulation::find_effect("ligament")->parameters()) {
+    const simulation::Setting& setting = model.effects[0].parameters.at(row.name);
+    EXPECT_TRUE(setting.free) << row.name;
+    EXPECT_EQ(setting.value, row.median) << row.name;
+    EXPECT_GT(setting.prior_sd.value(), 0) << row.name;
+    EXPECT_EQ(setting.lower, row.lower) << row.name;
+    EXPECT_EQ(setting.upper, row.upper) << row.name;
+  }
+}
+
+TEST_F(ModelEdit, RemovingKeepsTheCommentOfTheNextTable) {
+  const auto path =
+      file("[[effect]]\nname = \"ligament\"\nwidth_mm = 10\n\n# about the skin\n[skin]\nthickness_mm = 2\n");
+  EXPECT_EQ(without_effect(path, "ligament"), "\n# about the skin\n[skin]\nthickness_mm = 2\n");
+}
+
+TEST_F(ModelEdit, AddingTwiceIsRefusedWithTheLine) {
+  const auto path = file(with_effect(file(base), "ligament"));
+  expect_words(input_error([&] { with_effect(path, "ligament"); }), {"model.toml:4", "already"});
+}
+
+TEST_F(ModelEdit, AMisspeltEffectIsRefusedWithTheNearestName) {
+  expect_words(input_error([&] { with_effect(file(base), "ligamnet"); }), {"ligamnet", "did you mean ligament?"});
+}
+
+TEST_F(ModelEdit, RemovingWhatIsNotThereIsRefused) {
+  expect_words(input_error([&] { without_effect(file(base), "ligament"); }), {"model.toml", "ligament"});
+}
+
+TEST_F(ModelEdit, NewValuesKeepEverythingElse) {
+  const std::string text =
+      "# größer\n[breast]\nyoung_modulus_kpa = { value = 0.5, prior_sd = 0.4 }  # µ\n[skin]\nthickness_mm = 2\n"
+      "[skin.young_modulus_kpa]\nvalue = 20  # soft\n[[effect]]\nname = \"ligament\"\n"
+      "stiffness_kpa_per_mm = { lower = 0, value = 0.4 }\n";
+  const auto path = file(text);
+  const std::string edited = with_values(path, {{"breast.young_modulus_kpa", 1.0 / 3},
+                                                {"skin.young_modulus_kpa", 33.25},
+                                                {"ligament.stiffness_kpa_per_mm", 0.125}});
+  std::string expected = text;
+  expected.replace(expected.find("value = 0.5"), 11, "value = 0.3333333333333333");
+  expected.replace(expected.find("value = 20"), 10, "value = 33.25");
+  expected.replace(expected.find("value = 0.4"), 11, "value = 0.125");
+  EXPECT_EQ(edited, expected);
+  const simulation::Model model = read_model(file(edited));
+  EXPECT_EQ(model.breast.young_modulus_kpa.value, 1.0 / 3);
+  EXPECT_EQ(model.skin.young_modulus_kpa.value, 33.25);
+}
+
+TEST_F(ModelEdit, NewValuesAreForFreeParametersOnly) {
+  EXPECT_THROW(with_values(file(base), {{"breast.young_modulus_kpa", 1}}), InputError);
+  EXPECT_THROW(with_values(file(base), {{"ligament.stiffness_kpa_per_mm", 1}}), InputError);
+}
+
+}  // namespace
+}  // namespace supine::pipeline
