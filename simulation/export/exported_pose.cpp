@@ -37,7 +37,7 @@ void add_skin(const meshing::TetMesh& mesh, const Model& model, const Layout& la
     const Eigen::RowVector3i face = mesh.faces.row(layout.skin.faces[f]).head<3>();
     const Eigen::RowVector3d a = pose.X.row(face[0]), b = pose.X.row(face[1]), c = pose.X.row(face[2]);
     const Eigen::RowVector3d normal = (b - a).cross(c - a).normalized();
-    pose.skin.row(f) << face, static_cast<int>(pose.nodes + f);
+    pose.skin.row(f) << face[0], face[1], face[2], static_cast<int>(pose.nodes + f);
     pose.X.row(pose.nodes + f) = (a + b + c) / 3 + 3 * thickness_mm * normal;
   }
 }
