@@ -4,6 +4,7 @@
 #   make test                        the same set-up, then every test
 #   make CASE=dir [OUT=dir] [stage]  run a case: segment reconstruct decimate mesh simulate compare, or as far as its data allow;
 #                                    then calibrate, diagnose, ladder; report: one page of what is there
+#   make style                       whether every source file is as clang-format 14 writes it; make format writes it
 #   make build                       only build, into $(BUILD); make tools: without tests and measurements
 #   make bench [DATA=dir]            every measurement of docs/verification.md and docs/performance.md: hours, on a quiet machine
 #   make study [DATA=dir]            every table of docs/study.md: an hour or more, on a quiet machine
@@ -12,6 +13,8 @@
 SHELL := /bin/bash
 BUILD ?= build
 CONFIG ?= Release
+# ON: warnings are errors, library assertions are on; what .ci/run builds.
+DEVELOPER ?= OFF
 # One compiler per core, as far as 1.5 GB of free memory for each allow: heavy templates.
 JOBS ?= $(shell awk -v cores=$$(nproc) '/^MemAvailable/ { m = int($$2 / 1572864); n = m < cores ? m : cores; print n < 1 ? 1 : n }' /proc/meminfo)
 
@@ -20,7 +23,7 @@ run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 
 DATA ?= ../shared/data
 
-.PHONY: bench study hidden demo test build tools configure setup clean help case $(stages)
+.PHONY: style format bench study hidden demo test build tools configure setup clean help case $(stages)
 
 ifdef CASE
 case: tools
@@ -38,7 +41,7 @@ setup:
 	@pipeline/setup.sh
 
 configure: setup
-	@[ -f $(BUILD)/build.ninja ] || cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=$(CONFIG)
+	@[ -f $(BUILD)/build.ninja ] || cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=$(CONFIG) -DSUPINE_DEVELOPER=$(DEVELOPER)
 
 build: configure
 	@cmake --build $(BUILD) --parallel $(JOBS)
@@ -58,6 +61,13 @@ demo: tools
 
 test: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel 2
+
+# Version 14, Debian 12's: other versions write other lines.
+clang_format = $(firstword $(shell command -v clang-format-14 clang-format))
+sources = $(shell git ls-files '*.cpp' '*.h')
+style format:
+	@$(or $(clang_format),clang-format) --version | grep -q 'version 14\.' || { echo "make $@ needs clang-format 14: apt-get install clang-format-14" >&2; exit 2; }
+	@$(clang_format) $(if $(filter style,$@),--dry-run -Werror,-i) $(sources)
 
 study: build
 	@bench/study.sh $(DATA)/hidden-open $(BUILD)/study $(BUILD)/bin

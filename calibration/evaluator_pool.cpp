@@ -18,8 +18,8 @@ const simulation::SolveOptions brief{.max_iterations = 25, .smallest_load_step =
 
 }  // namespace
 
-EvaluatorPool::EvaluatorPool(const MeasuredScene& scene, const FreeParameters& parameters, simulation::ChainSolution reference,
-                             int threads)
+EvaluatorPool::EvaluatorPool(const MeasuredScene& scene, const FreeParameters& parameters,
+                             simulation::ChainSolution reference, int threads)
     : parameters_(parameters), reference_(std::move(reference)) {
   for (int t = 0; t < std::max(1, threads); ++t)
     evaluators_.push_back(std::make_unique<Evaluator>(scene, parameters.base(), brief));

@@ -16,7 +16,8 @@ class EvaluatorPool {
  public:
   /// @param reference  solution of @p parameters' start, or of another model near what will be asked
   /// @param threads    at least 1
-  EvaluatorPool(const MeasuredScene& scene, const FreeParameters& parameters, simulation::ChainSolution reference, int threads);
+  EvaluatorPool(const MeasuredScene& scene, const FreeParameters& parameters, simulation::ChainSolution reference,
+                int threads);
 
   /// @param values   of the parameters, one vector per run
   /// @param journal  asked first, told after

@@ -15,8 +15,8 @@ namespace supine::diagnosis {
 
 /// What is examined. Everything it points to must outlive the findings.
 struct Subject {
-  calibration::MeasuredScene fitted;                        ///< poses that the model was fitted to
-  calibration::MeasuredScene whole;                         ///< those, then every other measured pose
+  calibration::MeasuredScene fitted;                ///< poses that the model was fitted to
+  calibration::MeasuredScene whole;                 ///< those, then every other measured pose
   simulation::Model model;                          ///< calibrated
   std::vector<double> noise_mm;                     ///< per fitted measurement
   const simulation::ChainSolution* near = nullptr;  ///< solution of the model, where known

@@ -121,8 +121,9 @@ double crossing(const Profile& profile, double reach, double farthest, double he
   return step;
 }
 
-FittedParameter profiled(const calibration::MeasuredScene& scene, const Metric& metric, const FreeParameters& parameters,
-                         const WeightedFit& least, Eigen::Index i, const FittedParameter& linear) {
+FittedParameter profiled(const calibration::MeasuredScene& scene, const Metric& metric,
+                         const FreeParameters& parameters, const WeightedFit& least, Eigen::Index i,
+                         const FittedParameter& linear) {
   const Profile profile(scene, metric, parameters, least, i);
   const double u = least.fit.u[i], height = level * std::max(1.0, misfit_of(least, parameters, metric));
   const double variance =

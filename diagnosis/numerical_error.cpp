@@ -215,7 +215,8 @@ NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, 
   return result;
 }
 
-std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::MeasuredScene& whole, const NumericalError& fitted) {
+std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::MeasuredScene& whole,
+                                                    const NumericalError& fitted) {
   const std::size_t count = fitted.finer.poses.size();
   if (count == 0 || whole.measurements.size() == count) return {};
   // They only confirm: a pose that does not come out in a few steps is left as it is.

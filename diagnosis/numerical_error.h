@@ -40,7 +40,8 @@ NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, 
 /// @param whole   the scene that @p fitted was measured in and, after its measurements, those that are not fitted
 /// @param fitted  what measure_numerical_error() found
 /// @return mm, #P of each scan that is not fitted
-std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::MeasuredScene& whole, const NumericalError& fitted);
+std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::MeasuredScene& whole,
+                                                    const NumericalError& fitted);
 
 /// Length l of exp(−r/l) that fits the correlation of neighbours in @p field, a change over the residuals' points with
 /// or without a mean; between 5 and 60 mm.

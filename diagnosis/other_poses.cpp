@@ -14,8 +14,8 @@ namespace supine::diagnosis {
 namespace {
 
 using calibration::FreeParameters;
-using calibration::Prediction;
 using calibration::MeasuredScene;
+using calibration::Prediction;
 
 std::size_t fitted_poses(const WeightedFit& fit) { return fit.fit.prediction.solution.poses.size(); }
 

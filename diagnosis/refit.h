@@ -44,10 +44,10 @@ simulation::EffectSetting free_setting(const std::string& effect);
 
 /// What all refits start from.
 struct RefitProblem {
-  calibration::MeasuredScene scene;        ///< fitted poses
-  calibration::MeasuredScene whole;        ///< and those that were not, after them
-  const simulation::Model* given;  ///< the base model as it was given: where its priors stand
-  const simulation::Model* model;  ///< at its optimum
+  calibration::MeasuredScene scene;  ///< fitted poses
+  calibration::MeasuredScene whole;  ///< and those that were not, after them
+  const simulation::Model* given;    ///< the base model as it was given: where its priors stand
+  const simulation::Model* model;    ///< at its optimum
   const WeightedFit* base;
   const Metric* metric;
   const ErrorSources* sources;                       ///< of the metric
