@@ -80,7 +80,7 @@ class CompareTool : public Tool {
     calibration::check_placement(scan, model, inputs.predicted.mesh.muscle, scan_name);
     const auto landmarks = compare_landmarks(inputs, motion, run);
     run.stage("anatomy");
-    const calibration::SkinAreas areas = find_areas(inputs, run);
+    const calibration::SkinAreas areas = find_areas(inputs);
     run.stage("compare");
     const Comparison comparison = calibration::compare(model, scan, areas);
     run.stage("write");
@@ -119,7 +119,7 @@ class CompareTool : public Tool {
     return inputs;
   }
 
-  calibration::SkinAreas find_areas(const Inputs& inputs, Run& run) const {
+  calibration::SkinAreas find_areas(const Inputs& inputs) const {
     const auto anatomy = meshing::compute_anatomy(inputs.predicted.mesh, inputs.measured.side);
     return calibration::anatomical_areas(inputs.predicted.mesh, anatomy);
   }
