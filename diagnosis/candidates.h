@@ -23,8 +23,8 @@ struct CandidateParameter {
 struct Candidate {
   std::string effect;
   std::vector<CandidateParameter> parameters;
-  Eigen::MatrixXd slope;   ///< ∂d/∂(parameter) at its null, #R by #parameters, mm per unit; through both solves
-  Eigen::VectorXd secant;  ///< change of the distances at the usual size, #R; empty where it was not solved
+  Eigen::MatrixXd slope;     ///< ∂d/∂(parameter) at its null, #R by #parameters, mm per unit; through both solves
+  Eigen::VectorXd secant{};  ///< change of the distances at the usual size, #R; empty where it was not solved
 };
 
 /// Every effect of the catalogue that is not in the model and that the fitted points can feel. Parameters that change

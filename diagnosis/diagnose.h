@@ -48,8 +48,8 @@ struct BaseFigures {
   double rms_mm = 0, held_out_rms_mm = 0, noise_mm = 0;
   std::vector<double> pose_rms_mm;  ///< poses that were not fitted, then fitted ones left out
   LackOfFit left;
-  std::size_t unfitted_poses = 0;     ///< how many of these poses were not fitted
-  std::vector<double> pose_noise_mm;  ///< of their scans; empty = noise_mm for each
+  std::size_t unfitted_poses = 0;       ///< how many of these poses were not fitted
+  std::vector<double> pose_noise_mm{};  ///< of their scans; empty = noise_mm for each
 };
 
 struct Diagnosis {

@@ -34,12 +34,12 @@ struct NoiseFloor {
 /// Divides out the coil's shading: exp of a polynomial in the coordinates, fitted to ln(grey) of one tissue
 /// (fat) with outliers beyond 2.5 sigma dropped. Afterwards that tissue has the grey `level`.
 struct Bias {
-  GreyRange tissue;     ///< candidates, mostly of that tissue; unbounded without `within` = the upper of two classes
-                        ///< (Otsu) of what is brighter than the air
-  int degree = 2;       ///< total degree, 0 to 4
-  float level = 100;    ///< > 0
-  std::string within;   ///< candidates lie in this mask
-  double local_mm = 0;  ///< then also divides by the tissue's local mean (Gaussian of this sd); 0 = not
+  GreyRange tissue;      ///< candidates, mostly of that tissue; unbounded without `within` = the upper of two classes
+                         ///< (Otsu) of what is brighter than the air
+  int degree = 2;        ///< total degree, 0 to 4
+  float level = 100;     ///< > 0
+  std::string within{};  ///< candidates lie in this mask
+  double local_mm = 0;   ///< then also divides by the tissue's local mean (Gaussian of this sd); 0 = not
 };
 
 /// Smooths the grey volume.

@@ -4,6 +4,7 @@
 #include <vtkGenericCell.h>
 #include <vtkNew.h>
 #include <vtkPoints.h>
+#include <vtkSMPTools.h>
 #include <vtkStaticCellLocator.h>
 #include <vtkUnstructuredGrid.h>
 
@@ -162,7 +163,9 @@ Embedding::Embedding(const meshing::TetMesh& mesh, const Points& points)
   const auto around = mesh.order() == 2 ? cells_of_nodes(mesh) : std::vector<std::vector<int>>();
   vtkNew<vtkStaticCellLocator> locator;
   locator->SetDataSet(grid);
-  locator->BuildLocator();
+  // On several threads the order inside its bins, and so which of two cells a point on their common face gets, would be
+  // that of chance.
+  vtkSMPTools::LocalScope(vtkSMPTools::Config("Sequential"), [&locator] { locator->BuildLocator(); });
   vtkNew<vtkGenericCell> scratch;
   for (Eigen::Index p = 0; p < points.rows(); ++p) {
     double at[3] = {points(p, 0), points(p, 1), points(p, 2)}, closest[3], distance2 = 0;

@@ -156,7 +156,9 @@ TEST_P(Shapes, KeepTopology) {
   const SurfaceReport report = check_surface(shape.surface);
   ASSERT_TRUE(report.manifold());
   ASSERT_EQ(open_borders(shape.surface), shape.borders);
-  if (report.closed()) ASSERT_EQ(report.genus(), shape.genus);
+  if (report.closed()) {
+    ASSERT_EQ(report.genus(), shape.genus);
+  }
   const DecimateResult result = decimate(shape.surface, options_for(shape, 1));
   expect_kept(shape.surface, result, shape.bound_mm);
   EXPECT_TRUE(result.fallback.empty()) << result.fallback;
@@ -201,9 +203,9 @@ std::vector<Shape> some_shapes() {
 }
 
 INSTANTIATE_TEST_SUITE_P(Decimate, Shapes, ::testing::ValuesIn(shapes()),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& test) { return test.param.name; });
 INSTANTIATE_TEST_SUITE_P(Decimate, SomeShapes, ::testing::ValuesIn(some_shapes()),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& test) { return test.param.name; });
 
 }  // namespace
 }  // namespace supine::meshing

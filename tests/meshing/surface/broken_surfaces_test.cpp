@@ -287,7 +287,9 @@ TEST_P(BrokenSurfaces, AreRefusedWithTheirPlaceOrDecimatedSoundly) {
     EXPECT_NE(message.find(fault.word), std::string::npos) << message;
     const auto named = place_in(message);
     ASSERT_TRUE(named) << message;
-    if (where) EXPECT_LT((*named - *where).norm(), near_mm) << message << " at " << where->transpose();
+    if (where) {
+      EXPECT_LT((*named - *where).norm(), near_mm) << message << " at " << where->transpose();
+    }
   }
 }
 
@@ -308,7 +310,7 @@ TEST_P(BrokenSurfaces, AreRefusedByTheMesherToo) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Corpus, BrokenSurfaces, ::testing::ValuesIn(faults()),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& test) { return test.param.name; });
 
 TEST(SoundSurface, OpenSheetsMustAgreeOnTheirSides) {
   // A band with half a turn has one side only.

@@ -100,7 +100,7 @@ class SqueezedDome : public ::testing::Test {
     x.col(2) *= squeeze;
     body.evaluate({x, scene.mesh.points});
   }
-  double slope(const Eigen::VectorXd& step) const { return body.sums.residual.dot(step); }
+  double slope(const Eigen::VectorXd& along) const { return body.sums.residual.dot(along); }
 
   const testing::TestScene& scene;
   Loaded body;
