@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/embedding.h"
 
+#include <vtkCellLocator.h>
 #include <vtkGenericCell.h>
 #include <vtkNew.h>
 #include <vtkPoints.h>
-#include <vtkSMPTools.h>
-#include <vtkStaticCellLocator.h>
 #include <vtkUnstructuredGrid.h>
 
 #include <Eigen/Geometry>
@@ -161,11 +160,11 @@ Embedding::Embedding(const meshing::TetMesh& mesh, const Points& points)
     : nodes_(points.rows(), mesh.cells.cols()), weight_(points.rows(), mesh.cells.cols()), outside_mm_(points.rows()) {
   const auto grid = corner_grid(mesh);
   const auto around = mesh.order() == 2 ? cells_of_nodes(mesh) : std::vector<std::vector<int>>();
-  vtkNew<vtkStaticCellLocator> locator;
+  // vtkStaticCellLocator is built on several threads: the order inside its bins, and so which of two cells a point on
+  // their common face gets, is that of chance.
+  vtkNew<vtkCellLocator> locator;
   locator->SetDataSet(grid);
-  // On several threads the order inside its bins, and so which of two cells a point on their common face gets, would be
-  // that of chance.
-  vtkSMPTools::LocalScope(vtkSMPTools::Config("Sequential"), [&locator] { locator->BuildLocator(); });
+  locator->BuildLocator();
   vtkNew<vtkGenericCell> scratch;
   for (Eigen::Index p = 0; p < points.rows(); ++p) {
     double at[3] = {points(p, 0), points(p, 1), points(p, 2)}, closest[3], distance2 = 0;
