@@ -101,8 +101,9 @@ void expect_balance(Solver solver, const ExportedPose& pose, const char* bound) 
   const auto file = folder / ("model" + export_extension(solver));
   write_export(solver, pose, file);
   write_displacements(pose, folder / "answer.csv");
-  const std::string run = "python3 " SUPINE_SOURCE_DIR "/tests/simulation/read_export.py " + file.string() + " " +
-                          (folder / "answer.csv").string() + " " + bound + " > " + (folder / "log").string() + " 2>&1";
+  const std::string run = "python3 " SUPINE_SOURCE_DIR "/tests/simulation/export/read_export.py " + file.string() +
+                          " " + (folder / "answer.csv").string() + " " + bound + " > " + (folder / "log").string() +
+                          " 2>&1";
   EXPECT_EQ(std::system(run.c_str()), 0) << pose.name << ": " << pipeline::read_text(folder / "log");
 }
 
@@ -129,11 +130,11 @@ TEST(SecondOpinion, TheReaderSeesAWrongForce) {
   TemporaryFolder folder;
   write_export(Solver::febio, pose, folder / "model.feb");
   write_displacements(pose, folder / "answer.csv");
-  EXPECT_NE(
-      std::system(("python3 " SUPINE_SOURCE_DIR "/tests/simulation/read_export.py " + (folder / "model.feb").string() +
-                   " " + (folder / "answer.csv").string() + " 1e-3 > " + (folder / "log").string() + " 2>&1")
-                      .c_str()),
-      0);
+  EXPECT_NE(std::system(("python3 " SUPINE_SOURCE_DIR "/tests/simulation/export/read_export.py " +
+                         (folder / "model.feb").string() + " " + (folder / "answer.csv").string() + " 1e-3 > " +
+                         (folder / "log").string() + " 2>&1")
+                            .c_str()),
+            0);
 }
 
 TEST(SecondOpinion, SkinTetrahedronHoldsAreaTimesThickness) {
