@@ -13,7 +13,7 @@ namespace supine::simulation {
 namespace {
 
 // Load steps.
-constexpr int quick_iterations = 8;        // a load step solved in so many makes the next one twice as long
+constexpr int quick_iterations = 8;        // a load step solved in so many is easy: the next one is twice as long
 constexpr double crushed_step_factor = 4;  // where elements are crushed, smaller load steps than this only repeat it
 constexpr double squeezed_det_f = 0.1;     // an element under this is the place to look at, not the worst balance
 // Newton steps.

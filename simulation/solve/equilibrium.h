@@ -55,7 +55,7 @@ struct SolveReport {
   int factorisations = 0;     ///< fewer than iterations where one serves several, more where the energy is not convex
   int load_steps = 0;         ///< completed
   double min_det_f = 1;       ///< smallest det F (F = ∂x/∂X) over the quadrature points
-  double residual_share = 0;  ///< |r| / |w| at the end, as in Termination
+  double residual_share = 0;  ///< |r| / |w| at the end, as in Termination; 0 without weight
   Termination termination = Termination::residual_small;  ///< of the last load step: one of the converged
   int folded_cells = 0;  ///< filled by Chain: quadratic cells inside out between their quadrature points (folds.h)
 };
