@@ -44,7 +44,7 @@ int Pattern::block(int a, int b) const {
 
 namespace {
 
-constexpr std::size_t cluster_size = 32;
+constexpr std::size_t cluster_size = 32;  // elements: enough work per task, few enough for many tasks per colour
 
 /// Elements at each node, concatenated: those of node n are at first[n] to first[n + 1].
 struct Incidence {
@@ -95,7 +95,8 @@ Elements::Elements(Indices nodes, const Pattern& pattern) : nodes_(std::move(nod
 }
 
 void Elements::colour_clusters(std::vector<Cluster> clusters, Eigen::Index mesh_nodes) {
-  // Greedy: the lowest colour that no cluster at any of the nodes has taken. 64 colours per word.
+  constexpr int word_bits = 64;
+  // Greedy: the lowest colour that no cluster at any of the nodes has taken; one bit per colour, word by word.
   std::vector<std::vector<std::uint64_t>> taken(mesh_nodes, std::vector<std::uint64_t>(1, 0));
   for (Cluster& cluster : clusters) {
     int colour = -1;
@@ -107,10 +108,10 @@ void Elements::colour_clusters(std::vector<Cluster> clusters, Eigen::Index mesh_
           if (words.size() <= word) words.resize(word + 1, 0);
           used |= words[word];
         }
-      if (~used != 0) colour = static_cast<int>(64 * word) + __builtin_ctzll(~used);
+      if (~used != 0) colour = static_cast<int>(word_bits * word) + __builtin_ctzll(~used);
     }
     for (const int e : cluster)
-      for (const int node : nodes_.row(e)) taken[node][colour / 64] |= std::uint64_t{1} << (colour % 64);
+      for (const int node : nodes_.row(e)) taken[node][colour / word_bits] |= std::uint64_t{1} << (colour % word_bits);
     if (static_cast<int>(colours_.size()) <= colour) colours_.resize(colour + 1);
     colours_[colour].push_back(std::move(cluster));
   }
@@ -123,7 +124,7 @@ Sums::Sums(const Pattern& pattern)
 
 void Sums::clear(const Demand& demand) {
   energy = 0;
-  min_det_f = 1e300;
+  min_det_f = no_det_f;
   min_cell = -1;
   valid = true;
   if (demand.residual) residual.setZero();

@@ -10,18 +10,22 @@
 
 namespace supine::simulation {
 
+/// Square over the dofs of a mesh; dof 3 node + axis.
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
 
 /// Sparsity of the 3-by-3 node blocks of a mesh: nodes that share a cell. Made once per mesh.
 class Pattern {
  public:
+  /// @param cells  #C by nodes per cell, in [0, nodes)   @param nodes  of the mesh
   Pattern(const Indices& cells, Eigen::Index nodes);
 
   Eigen::Index dofs() const { return 3 * nodes_; }
-  /// A matrix with this pattern and zero values; entry storage order as entry() says.
+  /// A matrix with this pattern and zero values, stored in the order that block() says.
   SparseMatrix zero_matrix() const;
   /// Offset of block (a, b)'s first entry in the value array; its column k, row i is at offset + k * stride(b) + i.
+  /// @pre  nodes a and b share a cell
   int block(int a, int b) const;
+  /// Entries per column of node b.
   int stride(int b) const { return 3 * (first_[b + 1] - first_[b]); }
 
  private:
@@ -35,11 +39,16 @@ class Pattern {
 /// order whatever the number of threads, and there are few colours to wait for.
 class Elements {
  public:
+  /// Rows of nodes().
+  using Cluster = std::vector<int>;
+
+  /// @param nodes    #E by nodes per element; those of one element share a cell of the pattern
+  /// @param pattern  of the mesh; not kept
   Elements(Indices nodes, const Pattern& pattern);
 
   const Indices& nodes() const { return nodes_; }
   Eigen::Index count() const { return nodes_.rows(); }
-  using Cluster = std::vector<int>;
+  /// By colour; every element is in one cluster.
   const std::vector<std::vector<Cluster>>& colours() const { return colours_; }
   /// Positions of the n × n node blocks of element @p e, row-major over (a, b).
   const int* blocks(int e) const {
@@ -75,21 +84,30 @@ struct Sums {
   bool valid = true;     ///< no element is inverted, in x or in X
   std::vector<double> element_energy, element_det_f;  ///< buffers of add_elements
 
+  /// Zero, of the pattern's size.
   explicit Sums(const Pattern& pattern);
+  /// Zero for what is demanded; what is not keeps its values.
   void clear(const Demand& demand);
 };
 
-/// Contribution of one element.
+/// Larger than any det F: the smallest of no elements.
+inline constexpr double no_det_f = 1e300;
+
+/// Contribution of one element, dof 3 node + axis; units as of Sums.
 template <int Nodes>
 struct Local {
   static constexpr int dofs = 3 * Nodes;
   double energy = 0;
-  double min_det_f = 1e300;  ///< smallest det F of the element; <= 0 marks it inverted and its sums are void
+  double min_det_f = no_det_f;  ///< smallest det F of the element; <= 0 marks it inverted and its sums are void
   Eigen::Matrix<double, dofs, 1> residual;
   Eigen::Matrix<double, dofs, dofs> tangent, reference_tangent;
 };
 
-/// Adds kernel(element, local) of every element to the sums; the kernel fills what is demanded, from zero.
+/// Adds kernel(element, local) of every element to the sums; the kernel fills what is demanded, from zero. Where the
+/// reference tangent is demanded it may fill the tangent as well, which is dropped unless demanded.
+/// @param sums    of the pattern of @p elements
+/// @param kernel  void(int element, Local<Nodes>& local), called from several threads at once; must not throw
+/// @post  the same bytes for any number of threads; sums.valid is false where an element is inverted
 template <int Nodes, class Kernel>
 void add_elements(const Elements& elements, const Demand& demand, Sums& sums, const Kernel& kernel) {
   constexpr int n = Nodes;

@@ -44,7 +44,7 @@ ShapeTable<4, 3, 1> make_tet4() {
 
 ShapeTable<10, 3, 4> make_tet10() {
   ShapeTable<10, 3, 4> t;
-  const double near = 0.58541019662496845446, far = 0.13819660112501051518;
+  const double near = 0.58541019662496845446, far = 0.13819660112501051518;  // (5 + 3√5) / 20, (5 - √5) / 20
   for (int p = 0; p < 4; ++p) {
     Eigen::Vector4d b = Eigen::Vector4d::Constant(far);
     b[p] = near;
@@ -69,6 +69,7 @@ ShapeTable<3, 2, 3> make_tri3() {
 
 ShapeTable<6, 2, 6> make_tri6() {
   ShapeTable<6, 2, 6> t;
+  // Dunavant 1985, table of degree 4: two orbits of three points, the coordinate that differs and the weight of each.
   const std::array<double, 2> corner = {0.108103018168070, 0.816847572980459};
   const std::array<double, 2> share = {0.223381589678011, 0.109951743655322};
   for (int p = 0; p < 6; ++p) {

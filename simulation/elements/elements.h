@@ -12,6 +12,7 @@ namespace supine::simulation {
 /// @tparam N  nodes   @tparam D  parent dimension   @tparam Q  quadrature points
 template <int N, int D, int Q>
 struct ShapeTable {
+  // Nodes: corners, then mid-edges in VTK's order. ξ: the barycentric coordinates but the first.
   std::array<Eigen::Matrix<double, N, 1>, Q> value;     ///< N_a
   std::array<Eigen::Matrix<double, N, D>, Q> gradient;  ///< ∂N_a/∂ξ
   std::array<double, Q> weight;                         ///< parent measure; sums to 1/6 (tetrahedra) or 1/2 (triangles)
@@ -45,13 +46,14 @@ struct Tri6 {
 /// ∂N_a/∂ξ of the quadratic tetrahedron at its four corners, where it turns inside out first.
 const std::array<Eigen::Matrix<double, 10, 3>, 4>& tet10_corner_gradients();
 
-/// Shape functions of the quadratic tetrahedron at barycentric coordinates @p b (b.sum() = 1), VTK node order.
+/// N_a of the quadratic tetrahedron at barycentric coordinates @p b (b.sum() = 1), VTK node order.
 Eigen::Matrix<double, 10, 1> tet10_shape(const Eigen::Vector4d& b);
 
-/// Nodes of one element, one per row.
+/// Nodes of one element, one per row, mm.
 template <int Nodes>
 using NodeRows = Eigen::Matrix<double, Nodes, 3>;
 
+/// Those of element @p e. @param points  #N by 3, mm   @param nodes  #E by Nodes, in [0, #N)
 template <int Nodes>
 NodeRows<Nodes> gather(const Points& points, const Indices& nodes, int e) {
   NodeRows<Nodes> rows;

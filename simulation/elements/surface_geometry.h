@@ -15,6 +15,8 @@ struct FacePoint {
   Eigen::Matrix<double, Face::nodes, 3> area_X;  ///< ∂area/∂X_bK, mm
 };
 
+/// At quadrature point @p p of the face whose undeformed nodes are @p rest (mm).
+/// @tparam Face  Tri3 or Tri6   @pre  0 <= p < Face::points, and the face has an area there
 template <class Face>
 FacePoint<Face> face_point(const NodeRows<Face::nodes>& rest, int p) {
   const auto& table = Face::table();
@@ -33,7 +35,9 @@ FacePoint<Face> face_point(const NodeRows<Face::nodes>& rest, int p) {
 }
 
 /// Adds a density that depends on the interpolated x and X of a surface point: energy ∫ e(x, X) dA with
-/// ex = ∂e/∂x, exx = ∂²e/∂x², exX = ∂²e/∂x∂X, dA undeformed.
+/// ex = ∂e/∂x, exx = ∂²e/∂x², exX = ∂²e/∂x∂X, dA undeformed; e in mN/mm, so ex in kPa and exx in kPa/mm.
+/// @param value  shape functions at the point: Face::table().value[p]
+/// @post  the tangent is added to where either tangent is demanded
 template <class Face>
 void add_point_density(const FacePoint<Face>& point, const Eigen::Matrix<double, Face::nodes, 1>& value, double e,
                        const Eigen::Vector3d& ex, const Eigen::Matrix3d& exx, const Eigen::Matrix3d& exX,

@@ -15,6 +15,8 @@ struct TetPoint {
   Eigen::Matrix<double, Element::nodes, 3> b;  ///< ∂N_a/∂X_J, 1/mm; only when det > 0
 };
 
+/// At quadrature point @p p of the tetrahedron with these nodes (mm).
+/// @tparam Element  Tet4 or Tet10   @pre  0 <= p < Element::points
 template <class Element>
 TetPoint<Element> tet_point(const NodeRows<Element::nodes>& nodes, int p) {
   const auto& table = Element::table();

@@ -10,9 +10,10 @@
 namespace supine::simulation {
 namespace {
 
-constexpr int max_corrections = 60;  // fixed point
-constexpr double correction_tolerance_mm = 1e-3;
-constexpr double second_shape_bound_mm = 1e-3;  // two balanced shapes this close are one
+constexpr int max_corrections = 60;               // of the fixed point: linear convergence, slow where tissue is soft
+constexpr double correction_tolerance_mm = 1e-3;  // of the fixed point: far under what a scanner measures
+constexpr double second_shape_bound_mm = 1e-3;    // two balanced shapes this close are one
+constexpr double kg_mm3_per_kg_m3 = 1e-9;
 
 void check_prone_gravity(const PoseLoad& prone, const meshing::Anatomy& anatomy) {
   const double along = prone.gravity.dot(anatomy.outward);
@@ -49,7 +50,7 @@ void note_folds(const meshing::TetMesh& mesh, const Points& shape, const std::st
 }
 
 Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
-  return {mechanics.mesh(), mechanics.anatomy(), mechanics.layout(), pose};
+  return {.mesh = mechanics.mesh(), .anatomy = mechanics.anatomy(), .layout = mechanics.layout(), .pose = pose};
 }
 
 }  // namespace
@@ -72,14 +73,14 @@ ChainSolution Chain::solve(const Model& model, const ChainSolution* near, Invers
   ChainSolution solution;
   const Eigen::VectorXd offset = values_of(fields(model, poses_[0])).imaged_offset;
   solution.prone = mesh.points + Eigen::Map<const Points>(offset.data(), mesh.points.rows(), 3);
-  undeformed(model, method, near, solution);
+  solve_undeformed(model, method, near, solution);
   check_cells(mesh, solution.prone, solution.X, "undeformed", solution.inverse);
   note_folds(mesh, solution.X, "undeformed", solution.inverse, solution.warnings);
   for (std::size_t p = 1; p < poses_.size(); ++p) {
     load(model, poses_[p]);
     Points start;
     if (near != nullptr) start = pushed_forward(mesh.cells, near->poses[p - 1].x, near->X, solution.X);
-    PoseSolution pose{poses_[p].name, {}, {}};
+    PoseSolution pose{.name = poses_[p].name, .x = {}, .report = {}};
     pose.report = solver_.forward(solution.X, pose.x, "undeformed → " + pose.name, near != nullptr ? &start : nullptr);
     check_cells(mesh, pose.x, solution.X, pose.name, pose.report);
     note_folds(mesh, pose.x, pose.name, pose.report, solution.warnings);
@@ -121,7 +122,8 @@ void Chain::look_for_second_shapes(const Model& model, ChainSolution& solution) 
   }
 }
 
-void Chain::undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution) {
+void Chain::solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near,
+                             ChainSolution& solution) {
   const PoseLoad& prone = poses_[0];
   if (method == InverseMethod::newton) {
     load(model, prone);
@@ -131,12 +133,12 @@ void Chain::undeformed(const Model& model, InverseMethod method, const ChainSolu
         solver_.inverse(solution.prone, solution.X, "prone → undeformed", near != nullptr ? &start : nullptr);
     return;
   }
-  load(model, {prone.name, -prone.gravity});
+  load(model, {.name = prone.name, .gravity = -prone.gravity});
   solution.inverse = solver_.forward(solution.prone, solution.X, "prone → undeformed (reversed gravity)");
-  if (method == InverseMethod::fixed_point) correct(model, solution);
+  if (method == InverseMethod::fixed_point) correct_by_fixed_point(model, solution);
 }
 
-void Chain::correct(const Model& model, ChainSolution& solution) {
+void Chain::correct_by_fixed_point(const Model& model, ChainSolution& solution) {
   load(model, poses_[0]);
   SolveReport& report = solution.inverse;
   double error = 0;
@@ -147,6 +149,7 @@ void Chain::correct(const Model& model, ChainSolution& solution) {
     report.factorisations += forward.factorisations;
     report.load_steps = forward.load_steps;
     report.residual_share = forward.residual_share;
+    report.termination = forward.termination;
     error = (x - solution.prone).rowwise().norm().maxCoeff();
     if (error < correction_tolerance_mm) return;
     solution.X -= x - solution.prone;
@@ -167,7 +170,7 @@ ChainSolution solve_chain(const meshing::TetMesh& mesh, const meshing::Anatomy& 
 }
 
 double load_number(const meshing::Anatomy& anatomy, const Model& model) {
-  return model.breast.density_kg_m3.value * 1e-9 * gravity_mm_s2 * anatomy.mound_height_mm /
+  return model.breast.density_kg_m3.value * kg_mm3_per_kg_m3 * gravity_mm_s2 * anatomy.mound_height_mm /
          model.breast.young_modulus_kpa.value;
 }
 

@@ -18,13 +18,13 @@ enum class InverseMethod { newton, fixed_point, reversed_gravity };
 
 /// A body position to predict.
 struct PoseLoad {
-  std::string name;
+  std::string name;         ///< supine, …: what effects that act in some poses go by
   Eigen::Vector3d gravity;  ///< unit, LPS
 };
 
 struct PoseSolution {
   std::string name;
-  Points x;  ///< mm
+  Points x;  ///< #N by 3, mm
   SolveReport report;
   /// Largest distance to another balanced shape, that the solver reaches from the prone one; 0 where there is none.
   /// Looked for by Chain::certify() and only where forces have no energy (corotational_qr, friction): with one, the
@@ -33,8 +33,8 @@ struct PoseSolution {
 };
 
 struct ChainSolution {
-  Points prone;  ///< the known shape: imaged nodes, moved by what the model says of the segmentation; mm
-  Points X;      ///< undeformed shape, mm
+  Points prone;  ///< the known shape: imaged nodes, moved by what the model says of the segmentation; #N by 3, mm
+  Points X;      ///< undeformed shape, #N by 3, mm
   SolveReport inverse;
   std::vector<PoseSolution> poses;  ///< all but prone, in the order given
   PoseSolution round_trip;          ///< prone again, from X and no load; filled by Chain::certify()
@@ -48,7 +48,7 @@ struct ChainSolution {
 class Chain {
  public:
   /// @param mesh, anatomy  of the imaged shape; must outlive the object
-  /// @param poses  the first one is prone, the imaged pose
+  /// @param poses  the first one is prone, the imaged pose; at least that
   /// @throws InputError  prone gravity that points into the muscle (bound: the angle to the muscle's outward normal is
   ///   under 90°); what Mechanics refuses
   Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model, std::vector<PoseLoad> poses,
@@ -60,12 +60,16 @@ class Chain {
   /// @param model  of the kind given to the constructor: numbers and effects may differ
   /// @param near   solution for similar numbers to start from, or nullptr to start from the imaged shape and no load;
   ///   when that fails it starts without
-  /// @throws NumericalFailure  naming the pose
+  /// @return without round trip and second shapes, see certify()
+  /// @throws NumericalFailure  naming the pose: no equilibrium, or a cell inverted there
+  /// @throws InputError  what make_fields refuses
   ChainSolution solve(const Model& model, const ChainSolution* near = nullptr,
                       InverseMethod method = InverseMethod::newton);
 
   /// Makes the round trip: loads solution.X with prone gravity, from no load. Where forces have no energy it also looks
   /// for a second balanced shape of every pose.
+  /// @param solution  of @p model by this chain
+  /// @throws NumericalFailure  no equilibrium on the way back to prone
   void certify(const Model& model, ChainSolution& solution);
 
   /// Fields of one pose with the derivative with respect to @p varied (make_fields).
@@ -74,8 +78,8 @@ class Chain {
  private:
   friend class Sensitivities;
   void load(const Model& model, const PoseLoad& pose);
-  void undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
-  void correct(const Model& model, ChainSolution& solution);
+  void solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
+  void correct_by_fixed_point(const Model& model, ChainSolution& solution);
   void look_for_second_shapes(const Model& model, ChainSolution& solution);
 
   std::vector<PoseLoad> poses_;
@@ -86,7 +90,8 @@ class Chain {
   std::vector<std::unique_ptr<LuSolver>> spare_lu_;
 };
 
-/// A chain used once, with its round trip and with effects that can change nothing refused.
+/// A chain used once, with its round trip and with effects that can change nothing refused. Parameters and errors as of
+/// Chain::Chain(), solve() and certify().
 ChainSolution solve_chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
                           const std::vector<PoseLoad>& poses, InverseMethod method = InverseMethod::newton,
                           const SolveOptions& options = {});

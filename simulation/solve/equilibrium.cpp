@@ -5,35 +5,64 @@
 
 #include <algorithm>
 #include <limits>
-#include <optional>
+#include <utility>
 
 #include "common/error.h"
 
 namespace supine::simulation {
 namespace {
 
+// Load steps.
+constexpr int quick_iterations = 8;        // a load step solved in so many is easy: the next one is twice as long
+constexpr double crushed_step_factor = 4;  // where elements are crushed, smaller load steps than this only repeat it
+constexpr double squeezed_det_f = 0.1;     // an element under this is the place to look at, not the worst balance
+// Newton steps.
+constexpr double longest_step_mm = 40;  // a step beyond this is shortened before the line search
+// Line search.
 constexpr double sufficient_decrease = 1e-4;  // Armijo constant
 constexpr double natural_decrease = 0.25;     // Deuflhard's restricted monotonicity
-constexpr int max_halvings = 12;
-constexpr double longest_stride = 16;   // times a step of a changed tangent
-constexpr double still_steep = 0.3;     // share of the slope left that makes going on worth while
-constexpr double longest_step_mm = 40;  // a Newton step beyond this is shortened before the line search
-constexpr int stall_window = 12;        // iterations in which the residual must fall to stall_share of what it was
-constexpr double stall_share = 0.5;
-constexpr double loosest_residual = 1e-4;  // stiff ties leave rounding behind; more than this is no equilibrium
-constexpr double largest_fall = 0.1;       // det F may fall to this share of its value in one step
-constexpr double crushed_det_f = 1e-3;     // an element that comes here is on its way through zero
-constexpr double crushed_step_factor = 4;  // where elements are crushed, smaller load steps than this only repeat it
+constexpr double largest_fall = 0.1;          // det F may fall to this share of its value in one step
+constexpr double energy_rounding = 1e-13;     // relative: differences of energies below this say nothing
+// Going on along a step of a changed tangent.
+constexpr double longest_stride = 16;                  // times the step
+constexpr double still_steep = 0.3;                    // share of the slope left that makes going on worth while
+constexpr double least_growth = 1.5, most_growth = 4;  // of one stride over the last: an extrapolation is a guess
 
 using Flat = Eigen::Map<Eigen::VectorXd>;
+using ConstFlat = Eigen::Map<const Eigen::VectorXd>;
 
 /// Forcing term of an inexact Newton method that keeps quadratic convergence (Eisenstat and Walker 1996, choice 2),
 /// never finer than what the last digits need, or than what ends the solve at @p wanted_share.
 double linear_tolerance(double residual_share, double share_before, double wanted_share) {
-  constexpr double finest = 1e-6, coarsest = 1e-2, well_under = 0.3, loosest = 0.1;
+  constexpr double factor = 0.1;                    // γ of choice 2
+  constexpr double finest = 1e-6, coarsest = 1e-2;  // past six digits a step's own error is larger than the solve's
+  constexpr double well_under = 0.3;                // of what is wanted, so that the next residual is not just above
+  constexpr double loosest = 0.1;                   // a looser solve would often cost a further step
   const double ratio = residual_share / share_before;
-  const double quadratic = std::clamp(0.1 * ratio * ratio, finest, coarsest);
+  const double quadratic = std::clamp(factor * ratio * ratio, finest, coarsest);
   return std::max(quadratic, std::min(well_under * wanted_share / residual_share, loosest));
+}
+
+/// Why an attempt found no equilibrium, for the user.
+std::string reason(Termination end, int iterations, double residual_share) {
+  switch (end) {
+    case Termination::inverted:
+      return "an element is inverted";
+    case Termination::crushed:
+      return "an element is crushed";
+    case Termination::stalled:
+    case Termination::iteration_limit:
+      return fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iterations,
+                         residual_share);
+    case Termination::singular_tangent:
+      return "the tangent matrix is singular";
+    case Termination::line_search_failed:
+      return fmt::format("the line search stalled with {:.1e} of the weight out of balance", residual_share);
+    case Termination::residual_small:
+    case Termination::step_small:
+      break;
+  }
+  return "converged";
 }
 
 }  // namespace
@@ -51,72 +80,74 @@ SolveReport EquilibriumSolver::inverse(const Points& x, Points& X, const std::st
 
 SolveReport EquilibriumSolver::solve(Unknown unknown, const Points& known, Points& sought, const std::string& what,
                                      const Points* start) {
-  mechanics_.evaluate(State{known, known, 1.0}, Demand{.residual = true}, sums_);
+  mechanics_.evaluate(State{.x = known, .X = known, .load = 1.0}, Demand{.residual = true}, sums_);
   weight_norm_ = sums_.residual.norm();
   const int factorised_before = direction_.factorisations();
   what_ = what;
-  SolveReport report;
   if (start != nullptr) {
     sought = *start;
-    const Attempt attempt = newton(unknown, known, sought, 1.0);
-    if (attempt.converged) {
-      report = {attempt.iterations, direction_.factorisations() - factorised_before, 1, attempt.min_det_f,
-                attempt.residual_share};
-      return report;
-    }
+    const Attempt attempt = newton({.unknown = unknown, .known = known, .load = 1.0}, sought);
+    if (converged(attempt.end))
+      return {.newton_iterations = attempt.iterations,
+              .factorisations = direction_.factorisations() - factorised_before,
+              .load_steps = 1,
+              .min_det_f = attempt.min_det_f,
+              .residual_share = attempt.residual_share,
+              .termination = attempt.end};
   }
   sought = known;
-  report = step_load(unknown, known, sought);
+  SolveReport report = step_load(unknown, known, sought);
   report.factorisations = direction_.factorisations() - factorised_before;
   return report;
 }
 
-EquilibriumSolver::Attempt EquilibriumSolver::attempt_step(Unknown unknown, const Points& known, const Points& ahead,
-                                                           Points& trial, double load) {
-  const Points from = trial;
-  trial = ahead;
-  Attempt attempt = newton(unknown, known, trial, load);
-  if (attempt.converged || attempt.iterations > 0) return attempt;
-  trial = from;  // the straight line led into an inverted element
-  return newton(unknown, known, trial, load);
-}
-
 SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, Points& sought) {
+  constexpr double none = std::numeric_limits<double>::infinity();
   SolveReport report;
-  double load = 0, load_before = 0, step = 1, failed = std::numeric_limits<double>::infinity();
+  double load = 0, load_before = 0, step = 1, failed = none;
   Points at_load = sought, before = sought, trial, ahead;
   while (load < 1) {
     const double target = std::min({1.0, load + step, failed});
     ahead = at_load;
     if (load > 0) ahead += (target - load) / (load - load_before) * (at_load - before);
-    trial = at_load;
-    const Attempt last = attempt_step(unknown, known, ahead, trial, target);
+    const Attempt last = attempt_step({.unknown = unknown, .known = known, .load = target}, at_load, ahead, trial);
     report.newton_iterations += last.iterations;
-    if (last.converged) {
+    if (converged(last.end)) {
       load_before = load;
       load = target;
       before.swap(at_load);
       at_load.swap(trial);
-      if (load >= failed) failed = std::numeric_limits<double>::infinity();
+      if (load >= failed) failed = none;
       ++report.load_steps;
       report.residual_share = last.residual_share;
       report.min_det_f = last.min_det_f;
-      if (last.iterations <= 8) step *= 2;
+      report.termination = last.end;
+      if (last.iterations <= quick_iterations) step *= 2;
       continue;
     }
     failed = target;
     step = 0.5 * (target - load);
-    if (step < options_.smallest_load_step * (last.crushed ? crushed_step_factor : 1))
+    const bool crushed = last.end != Termination::inverted && last.min_det_f < crushed_det_f;
+    if (step < options_.smallest_load_step * (crushed ? crushed_step_factor : 1))
       throw NumericalFailure(failure(last, load, trial));
   }
   sought = at_load;
   return report;
 }
 
+EquilibriumSolver::Attempt EquilibriumSolver::attempt_step(const Problem& problem, const Points& from,
+                                                           const Points& ahead, Points& trial) {
+  trial = ahead;
+  const Attempt attempt = newton(problem, trial);
+  if (converged(attempt.end) || attempt.iterations > 0) return attempt;
+  trial = from;  // the straight line led into an inverted element
+  return newton(problem, trial);
+}
+
 std::string EquilibriumSolver::failure(const Attempt& last, double load, const Points& shape) const {
   Eigen::RowVector3d at = shape.row(last.worst_node);
   std::string place = fmt::format("; furthest out of balance at ({:.1f}, {:.1f}, {:.1f}) mm", at.x(), at.y(), at.z());
-  if (last.min_cell >= 0 && last.min_det_f < 0.1) {
+  if (last.min_cell >= 0 && last.min_det_f < squeezed_det_f) {
     at.setZero();
     for (int a = 0; a < 4; ++a) at += 0.25 * shape.row(mechanics_.mesh().cells(last.min_cell, a));
     place = fmt::format("; smallest det F {:.3g} in cell {} at ({:.1f}, {:.1f}, {:.1f}) mm", last.min_det_f,
@@ -126,20 +157,41 @@ std::string EquilibriumSolver::failure(const Attempt& last, double load, const P
       "{}: no equilibrium found beyond {:.0f} % of gravity ({}{}). A softer tissue than this shape can carry, or a "
       "poor mesh there: raise breast.young_modulus_kpa or skin.young_modulus_kpa, use law = \"neo_hookean\", or "
       "look at the mesh with supine-tetrahedralise --check",
-      what_, 100 * load, last.reason, place);
+      what_, 100 * load, reason(last.end, last.iterations, last.residual_share), place);
 }
 
-State EquilibriumSolver::state_of(Unknown unknown, const Points& known, const Points& sought, double load) {
-  return unknown == Unknown::deformed ? State{sought, known, load} : State{known, sought, load};
+State EquilibriumSolver::state_of(const Problem& problem, const Points& sought) {
+  return problem.unknown == Unknown::deformed ? State{.x = sought, .X = problem.known, .load = problem.load}
+                                              : State{.x = problem.known, .X = sought, .load = problem.load};
 }
 
-void EquilibriumSolver::evaluate(Unknown unknown, const Points& known, const Points& sought, double load) {
-  const bool forward = unknown == Unknown::deformed;
+/// Fills the sums with what a step and the merit need.
+void EquilibriumSolver::evaluate(const Problem& problem, const Points& sought) {
+  const bool forward = problem.unknown == Unknown::deformed;
   const Demand demand{.energy = forward, .residual = true, .tangent = forward, .reference_tangent = !forward};
-  mechanics_.evaluate(state_of(unknown, known, sought, load), demand, sums_);
+  mechanics_.evaluate(state_of(problem, sought), demand, sums_);
 }
 
-void EquilibriumSolver::note_state(Attempt& attempt) const {
+EquilibriumSolver::Attempt EquilibriumSolver::newton(const Problem& problem, Points& sought) {
+  Attempt attempt;
+  Eigen::VectorXd step;
+  const auto ended = [&attempt](Termination end) {
+    attempt.end = end;
+    return attempt;
+  };
+  evaluate(problem, sought);
+  for (;;) {
+    measure(attempt);
+    if (const auto end = unusable(attempt)) return ended(*end);
+    if (options_.progress) options_.progress(what_, problem.load, attempt.iterations, attempt.residual_share);
+    if (const auto end = settled(attempt)) return ended(*end);
+    if (!find_step(problem, sought, attempt, step)) return ended(Termination::singular_tangent);
+    if (!search_line(problem, step, sought)) return ended(Termination::line_search_failed);
+  }
+}
+
+/// Notes where the shape of the sums stands.
+void EquilibriumSolver::measure(Attempt& attempt) const {
   attempt.min_det_f = sums_.min_det_f;
   attempt.min_cell = sums_.min_cell;
   if (sums_.valid)
@@ -150,101 +202,109 @@ void EquilibriumSolver::note_state(Attempt& attempt) const {
   attempt.residual_share = weight_norm_ > 0 ? sums_.residual.norm() / weight_norm_ : 0;
 }
 
-bool EquilibriumSolver::search_line(Unknown unknown, const Points& known, Points& sought, double load,
-                                    const Eigen::VectorXd& step) {
-  const bool use_energy = unknown == Unknown::deformed && mechanics_.has_energy();
-  const double norm = sums_.residual.norm(), energy = sums_.energy, slope = sums_.residual.dot(step);
-  const Eigen::VectorXd residual = use_energy ? Eigen::VectorXd() : sums_.residual;
-  std::optional<double> natural;  // of that residual
-  const double least_det_f = largest_fall * std::min(sums_.min_det_f, 1.0);
+/// Whether the shape is none that a step can start from.
+std::optional<Termination> EquilibriumSolver::unusable(const Attempt& attempt) const {
+  if (!sums_.valid) return Termination::inverted;
+  if (attempt.iterations > 0 && attempt.min_det_f < crushed_det_f) return Termination::crushed;
+  return std::nullopt;
+}
+
+/// Whether the answer is found, or further steps will not find it.
+std::optional<Termination> EquilibriumSolver::settled(Attempt& attempt) const {
+  const double share = attempt.residual_share;
+  if (share <= options_.residual_tolerance) return Termination::residual_small;
+  if (attempt.moved_mm < options_.step_tolerance_mm && direction_.exact() && share <= loosest_residual_share)
+    return Termination::step_small;
+  if (attempt.iterations % stall_window == 0) {
+    if (share > stall_share * attempt.share_at_window) return Termination::stalled;
+    attempt.share_at_window = share;
+  }
+  if (attempt.iterations == options_.max_iterations) return Termination::iteration_limit;
+  return std::nullopt;
+}
+
+/// The next Newton step, no longer than longest_step_mm. @return false when there is none
+bool EquilibriumSolver::find_step(const Problem& problem, const Points& sought, Attempt& attempt,
+                                  Eigen::VectorXd& step) {
+  ++attempt.iterations;
+  const State state = state_of(problem, sought);
+  const double tolerance = linear_tolerance(attempt.residual_share, attempt.share_before, options_.residual_tolerance);
+  attempt.share_before = attempt.residual_share;
+  const bool found = problem.unknown == Unknown::deformed
+                         ? direction_.deformed(state, tolerance, attempt.moved_mm, sums_, step)
+                         : direction_.undeformed(state, tolerance, sums_, step);
+  if (!found) return false;
+  const double longest = step.cwiseAbs().maxCoeff();
+  if (longest > longest_step_mm) step *= longest_step_mm / longest;
+  attempt.moved_mm = step.cwiseAbs().maxCoeff();
+  return true;
+}
+
+/// Moves @p sought along the step as far as lowers the merit. @return false, and @p sought as it was, where none does
+bool EquilibriumSolver::search_line(const Problem& problem, const Eigen::VectorXd& step, Points& sought) {
+  const bool by_energy = problem.unknown == Unknown::deformed && mechanics_.has_energy();
+  Line line{.start = sought,
+            .step = step,
+            .by_energy = by_energy,
+            .energy = sums_.energy,
+            .slope = sums_.residual.dot(step),
+            .residual_norm = sums_.residual.norm(),
+            .residual = by_energy ? Eigen::VectorXd() : sums_.residual,
+            .natural_mm = std::nullopt,
+            .least_det_f = largest_fall * std::min(sums_.min_det_f, 1.0)};
   const bool last_digits = step.cwiseAbs().maxCoeff() < options_.step_tolerance_mm;
-  const Points start = sought;
   double alpha = 1;
   for (int halving = 0; halving <= max_halvings; ++halving, alpha *= 0.5) {
-    Flat(sought.data(), sought.size()) = Eigen::Map<const Eigen::VectorXd>(start.data(), start.size()) + alpha * step;
-    evaluate(unknown, known, sought, load);
-    if (!sums_.valid || sums_.min_det_f < least_det_f) continue;
-    if (last_digits) return true;  // the step moves by rounding only: neither merit says anything
-    const double rounding = 1e-13 * (std::abs(energy) + std::abs(sums_.energy));
-    if (use_energy ? sums_.energy <= energy + sufficient_decrease * alpha * slope + rounding
-                   : sums_.residual.norm() <= (1 - sufficient_decrease * alpha) * norm) {
-      if (use_energy && halving == 0 && !direction_.exact())
-        go_further(unknown, known, start, sought, load, step, slope, least_det_f);
-      return true;
-    }
-    if (use_energy) continue;
-    if (!natural) natural = direction_.natural_mm(residual);
-    if (direction_.natural_mm(sums_.residual) <= (1 - natural_decrease * alpha) * *natural) return true;
+    move_along(problem, line, alpha, sought);
+    if (!keeps_volume(line)) continue;
+    if (last_digits) return true;  // the step moves by rounding only: no merit says anything
+    if (!lowers_merit(line, alpha)) continue;
+    if (by_energy && halving == 0 && !direction_.exact()) go_further(problem, line, sought);
+    return true;
   }
-  sought = start;
+  sought = line.start;
   return false;
 }
 
-void EquilibriumSolver::go_further(Unknown unknown, const Points& known, const Points& start, Points& sought,
-                                   double load, const Eigen::VectorXd& step, double slope, double least_det_f) {
-  const auto move = [&](double alpha) {
-    Flat(sought.data(), sought.size()) = Eigen::Map<const Eigen::VectorXd>(start.data(), start.size()) + alpha * step;
-    evaluate(unknown, known, sought, load);
-  };
+/// Whether the shape of the sums, @p alpha steps along the line, is better than where that starts.
+bool EquilibriumSolver::lowers_merit(Line& line, double alpha) {
+  if (line.by_energy) {
+    const double rounding = energy_rounding * (std::abs(line.energy) + std::abs(sums_.energy));
+    return sums_.energy <= line.energy + sufficient_decrease * alpha * line.slope + rounding;
+  }
+  if (sums_.residual.norm() <= (1 - sufficient_decrease * alpha) * line.residual_norm) return true;
+  if (!line.natural_mm) line.natural_mm = direction_.natural_mm(line.residual);
+  return direction_.natural_mm(sums_.residual) <= (1 - natural_decrease * alpha) * *line.natural_mm;
+}
+
+bool EquilibriumSolver::keeps_volume(const Line& line) const {
+  return sums_.valid && sums_.min_det_f >= line.least_det_f;
+}
+
+/// A changed tangent is too stiff, so its steps are too short: from the end of the step goes on along the line while
+/// the energy falls steeply.
+void EquilibriumSolver::go_further(const Problem& problem, const Line& line, Points& sought) {
   double alpha = 1;
   while (alpha < longest_stride) {
-    const double energy = sums_.energy, here = sums_.residual.dot(step);
-    if (here > still_steep * slope) return;
+    const double energy = sums_.energy, slope = sums_.residual.dot(line.step);
+    if (slope > still_steep * line.slope) return;
     // Where the slope would be zero if it went on changing as it did so far.
-    const double next = std::clamp(alpha * slope / (slope - here), 1.5 * alpha, 4 * alpha);
-    const double guess = here < slope ? 4 * alpha : next;
-    move(guess);
-    if (!sums_.valid || sums_.min_det_f < least_det_f || sums_.energy > energy) {
-      move(alpha);
+    const double zero_slope = alpha * line.slope / (line.slope - slope);
+    const double next = std::clamp(zero_slope, least_growth * alpha, most_growth * alpha);
+    const double guess = slope < line.slope ? most_growth * alpha : next;
+    move_along(problem, line, guess, sought);
+    if (!keeps_volume(line) || sums_.energy > energy) {
+      move_along(problem, line, alpha, sought);
       return;
     }
     alpha = guess;
   }
 }
 
-EquilibriumSolver::Attempt EquilibriumSolver::newton(Unknown unknown, const Points& known, Points& sought,
-                                                     double load) {
-  Attempt attempt;
-  const auto give_up = [&attempt](std::string reason) {
-    attempt.reason = std::move(reason);
-    return attempt;
-  };
-  const auto stalled = [](int iteration, double share) {
-    return fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iteration, share);
-  };
-  Eigen::VectorXd step;
-  double share_before = 1;
-  double at_window = std::numeric_limits<double>::infinity();  // residual when the present window of iterations began
-  evaluate(unknown, known, sought, load);
-  for (int iteration = 0;; ++iteration) {
-    note_state(attempt);
-    if (!sums_.valid) return give_up("an element is inverted");
-    attempt.crushed = sums_.min_det_f < crushed_det_f;
-    if (attempt.crushed && iteration > 0) return give_up("an element is crushed");
-    if (options_.progress) options_.progress(what_, load, iteration, attempt.residual_share);
-    const double moved = iteration == 0 ? longest_step_mm : step.cwiseAbs().maxCoeff();
-    attempt.converged =
-        attempt.residual_share <= options_.residual_tolerance ||
-        (moved < options_.step_tolerance_mm && direction_.exact() && attempt.residual_share <= loosest_residual);
-    if (attempt.converged) return attempt;
-    if (iteration % stall_window == 0) {
-      if (attempt.residual_share > stall_share * at_window) return give_up(stalled(iteration, attempt.residual_share));
-      at_window = attempt.residual_share;
-    }
-    if (iteration == options_.max_iterations) return give_up(stalled(iteration, attempt.residual_share));
-    ++attempt.iterations;
-    const State state = state_of(unknown, known, sought, load);
-    const double tolerance = linear_tolerance(attempt.residual_share, share_before, options_.residual_tolerance);
-    share_before = attempt.residual_share;
-    const bool found = unknown == Unknown::deformed ? direction_.deformed(state, tolerance, moved, sums_, step)
-                                                    : direction_.undeformed(state, tolerance, sums_, step);
-    if (!found) return give_up("the tangent matrix is singular");
-    const double longest = step.cwiseAbs().maxCoeff();
-    if (longest > longest_step_mm) step *= longest_step_mm / longest;
-    if (!search_line(unknown, known, sought, load, step))
-      return give_up(
-          fmt::format("the line search stalled with {:.1e} of the weight out of balance", attempt.residual_share));
-  }
+/// Puts @p sought @p alpha steps along the line, and the sums with it.
+void EquilibriumSolver::move_along(const Problem& problem, const Line& line, double alpha, Points& sought) {
+  Flat(sought.data(), sought.size()) = ConstFlat(line.start.data(), line.start.size()) + alpha * line.step;
+  evaluate(problem, sought);
 }
 
 }  // namespace supine::simulation

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <functional>
+#include <limits>
+#include <optional>
 #include <string>
 
 #include "simulation/mechanics.h"
@@ -10,21 +12,52 @@
 namespace supine::simulation {
 
 struct SolveOptions {
-  int max_iterations = 40;            ///< Newton steps per load step
-  double step_tolerance_mm = 1e-8;    ///< the last Newton step moved no node further
-  double residual_tolerance = 1e-11;  ///< or |r| is under this share of the weight
-  double smallest_load_step = 1.0 / 128;
+  int max_iterations = 40;                ///< Newton steps per load step, >= 0
+  double step_tolerance_mm = 1e-8;        ///< of Termination::step_small, >= 0
+  double residual_tolerance = 1e-11;      ///< of Termination::residual_small, share of the weight, >= 0
+  double smallest_load_step = 1.0 / 128;  ///< share of the load, in (0, 1]
   /// Told at every iteration which solve is under way; may be empty.
   std::function<void(const std::string& what, double load, int iteration, double residual_share)> progress;
 };
+
+/// Stiff ties leave rounding behind; a larger share of the weight out of balance is no equilibrium.
+inline constexpr double loosest_residual_share = 1e-4;
+/// An element that comes to this det F is on its way through zero, where laws without a barrier let it pass.
+inline constexpr double crushed_det_f = 1e-3;
+/// Iterations in which the residual must fall to stall_share of what it was: a tangent that keeps being changed creeps.
+inline constexpr int stall_window = 12;
+inline constexpr double stall_share = 0.5;
+/// Of a Newton step: where 1/4096 of it is still too long, shorter load steps help more than shorter Newton steps.
+inline constexpr int max_halvings = 12;
+
+/// How Newton's method ended at one load. r is the residual, w the weight: the residual of the known shape taken as x
+/// and X at full load. det F is the smallest over the quadrature points. Those above the line are equilibria.
+enum class Termination {
+  residual_small,  ///< |r| <= residual_tolerance |w|
+  step_small,      ///< max |s_i| < step_tolerance_mm for the last step s, which NewtonDirection::exact() says is of the
+                   ///< exact tangent, and |r| <= loosest_residual_share |w|
+  // ----
+  inverted,            ///< det F <= 0, or det ∂X/∂ξ <= 0 in an element, in the shape Newton's method starts from
+  crushed,             ///< 0 < det F < crushed_det_f after a step
+  stalled,             ///< |r_k| > stall_share |r_(k - stall_window)| at iteration k, a multiple of stall_window
+  iteration_limit,     ///< max_iterations steps were taken
+  singular_tangent,    ///< NewtonDirection found no step
+  line_search_failed,  ///< no 2^-h of the step, h = 0 .. max_halvings, lowers the merit and keeps det F
+};
+
+/// Whether the shape is an equilibrium.
+constexpr bool converged(Termination end) {
+  return end == Termination::residual_small || end == Termination::step_small;
+}
 
 struct SolveReport {
   int newton_iterations = 0;  ///< over all load steps
   int factorisations = 0;     ///< fewer than iterations where one serves several, more where the energy is not convex
   int load_steps = 0;         ///< completed
-  double min_det_f = 1;
-  double residual_share = 0;  ///< |r| / |weight| at the end
-  int folded_cells = 0;       ///< filled by Chain: quadratic cells inside out between their quadrature points (folds.h)
+  double min_det_f = 1;       ///< smallest det F (F = ∂x/∂X) over the quadrature points
+  double residual_share = 0;  ///< |r| / |w| at the end, as in Termination; 0 without weight
+  Termination termination = Termination::residual_small;  ///< of the last load step: one of the converged
+  int folded_cells = 0;  ///< filled by Chain: quadratic cells inside out between their quadrature points (folds.h)
 };
 
 /// Finds equilibrium r(x, X) = 0 by Newton's method with exact tangents, line search and adaptive load steps: the full
@@ -32,11 +65,13 @@ struct SolveReport {
 /// the straight line through the last two shapes. Symbolic analysis is done once per object.
 class EquilibriumSolver {
  public:
+  /// @param mechanics  must outlive the object; its fields may be set anew between solves
   explicit EquilibriumSolver(const Mechanics& mechanics, SolveOptions options = {});
 
   /// Deformed shape for a known undeformed one. Merit: energy (for a law without energy that of inverse()).
-  /// @param X  undeformed nodes   @param x  out: equilibrium at full load, reached from x = X and no load
-  /// @param what  names the solve in messages, for example "supine"
+  /// @param X  undeformed nodes, #N by 3, mm
+  /// @param x  out: equilibrium at full load, #N by 3, mm, reached from x = X and no load
+  /// @param what  names the solve in messages, for example "undeformed → supine"
   /// @param start  a shape close to the answer, tried first at full load; or nullptr
   /// @throws NumericalFailure  load fraction reached, worst element and place, what to change; x is then undefined
   SolveReport forward(const Points& X, Points& x, const std::string& what, const Points* start = nullptr);
@@ -44,6 +79,7 @@ class EquilibriumSolver {
   /// Undeformed shape whose equilibrium under the load is the known deformed one (Govindjee and Mihalic 1996;
   /// Mazier et al. 2022). Unknown X, matrix ∂r/∂X. A step is good when it lowers |r| or the way in mm that the kept
   /// factor still asks for: |r| alone stalls on slender bodies, where a step that bends rightly stretches a little.
+  /// Parameters and errors as of forward(), with x and X changing places.
   SolveReport inverse(const Points& x, Points& X, const std::string& what, const Points* start = nullptr);
 
   /// Forgets what earlier solves left behind to save work, so that the next ones give the same bytes as after making.
@@ -51,28 +87,56 @@ class EquilibriumSolver {
 
  private:
   enum class Unknown { deformed, undeformed };
+  /// One system of equations: which shape is sought, the other one, and the share of the load.
+  struct Problem {
+    Unknown unknown;
+    const Points& known;
+    double load;
+  };
+  /// Newton's method at one load: where it is, and in the end how it ended.
   struct Attempt {
-    bool converged = false;
+    static constexpr double unknown_yet = std::numeric_limits<double>::infinity();
+    Termination end = Termination::iteration_limit;
     int iterations = 0;
-    std::string reason;
-    bool crushed = false;  ///< an element was about to turn inside out
     double min_det_f = 1;
     int min_cell = -1;
     Eigen::Index worst_node = 0;  ///< furthest out of balance
     double residual_share = 0;
+    double share_before = 1;               ///< residual_share one iteration before
+    double share_at_window = unknown_yet;  ///< residual_share when the present stall_window began
+    double moved_mm = unknown_yet;         ///< largest part of the last step along an axis
   };
+  /// The line that a Newton step draws, and what is known where it starts.
+  struct Line {
+    Points start;
+    const Eigen::VectorXd& step;
+    bool by_energy;  ///< the merit; else by the residual
+    double energy, slope;
+    double residual_norm;
+    Eigen::VectorXd residual;          ///< only if not by energy
+    std::optional<double> natural_mm;  ///< of that residual, once asked for
+    double least_det_f;                ///< that a shape on the line must keep
+  };
+
   SolveReport solve(Unknown unknown, const Points& known, Points& sought, const std::string& what, const Points* start);
   SolveReport step_load(Unknown unknown, const Points& known, Points& sought);
-  Attempt attempt_step(Unknown unknown, const Points& known, const Points& ahead, Points& trial, double load);
+  Attempt attempt_step(const Problem& problem, const Points& from, const Points& ahead, Points& trial);
   std::string failure(const Attempt& last, double load, const Points& shape) const;
-  void note_state(Attempt& attempt) const;
-  bool search_line(Unknown unknown, const Points& known, Points& sought, double load, const Eigen::VectorXd& step);
-  /// A changed tangent is too stiff, so its steps are too short: goes on along @p step while the energy falls steeply.
-  void go_further(Unknown unknown, const Points& known, const Points& start, Points& sought, double load,
-                  const Eigen::VectorXd& step, double slope, double least_det_f);
-  Attempt newton(Unknown unknown, const Points& known, Points& sought, double load);
-  static State state_of(Unknown unknown, const Points& known, const Points& sought, double load);
-  void evaluate(Unknown unknown, const Points& known, const Points& sought, double load);
+
+  Attempt newton(const Problem& problem, Points& sought);
+  void measure(Attempt& attempt) const;
+  std::optional<Termination> unusable(const Attempt& attempt) const;
+  std::optional<Termination> settled(Attempt& attempt) const;
+  bool find_step(const Problem& problem, const Points& sought, Attempt& attempt, Eigen::VectorXd& step);
+
+  bool search_line(const Problem& problem, const Eigen::VectorXd& step, Points& sought);
+  bool lowers_merit(Line& line, double alpha);
+  bool keeps_volume(const Line& line) const;
+  void go_further(const Problem& problem, const Line& line, Points& sought);
+  void move_along(const Problem& problem, const Line& line, double alpha, Points& sought);
+
+  static State state_of(const Problem& problem, const Points& sought);
+  void evaluate(const Problem& problem, const Points& sought);
 
   const Mechanics& mechanics_;
   SolveOptions options_;

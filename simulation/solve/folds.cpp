@@ -10,13 +10,18 @@
 #include "meshing/jacobian.h"
 
 namespace supine::simulation {
+namespace {
+
+constexpr int quadratic_nodes = 10;
+
+}  // namespace
 
 Folds find_folds(const Indices& cells, const Points& shape) {
   Folds folds;
-  if (cells.cols() != 10) return folds;
+  if (cells.cols() != quadratic_nodes) return folds;
   for (Eigen::Index c = 0; c < cells.rows(); ++c) {
     meshing::QuadraticNodes nodes;
-    for (int a = 0; a < 10; ++a) nodes.row(a) = shape.row(cells(c, a));
+    for (int a = 0; a < quadratic_nodes; ++a) nodes.row(a) = shape.row(cells(c, a));
     const auto coefficients = meshing::jacobian_coefficients(nodes);
     const auto least = std::min_element(coefficients.begin(), coefficients.end());
     if (*least > 0) continue;
@@ -25,7 +30,7 @@ Folds find_folds(const Indices& cells, const Points& shape) {
     const Eigen::Vector3d a = nodes.row(1) - nodes.row(0), b = nodes.row(2) - nodes.row(0),
                           d = nodes.row(3) - nodes.row(0);
     if (*corner > 0 && a.cross(b).dot(d) > 0 && meshing::scaled_jacobian_exceeds(nodes, 0)) continue;
-    const double mean = std::accumulate(coefficients.begin(), coefficients.end(), 0.0) / 20;
+    const double mean = std::accumulate(coefficients.begin(), coefficients.end(), 0.0) / coefficients.size();
     const double worst = (*corner <= 0 ? *corner : *least) / std::abs(mean);
     if (folds.cells == 0 || worst < folds.worst) {
       folds.worst = worst;

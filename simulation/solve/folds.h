@@ -17,8 +17,9 @@ struct Folds {
   Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();  ///< of that corner
 };
 
-/// Finds the cells of @p shape (#N by 3, mm) that are not proved to be the right way out by the Bernstein bounds of
+/// Finds the cells of a shape that are not proved to be the right way out by the Bernstein bounds of
 /// meshing/jacobian.h. Linear cells never fold.
+/// @param cells  #C by 4 or 10, VTK node order   @param shape  #N by 3, mm
 Folds find_folds(const Indices& cells, const Points& shape);
 
 /// What to tell the user of them; empty where there are none. @param name  of the shape, for example "undeformed"

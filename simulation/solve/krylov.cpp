@@ -9,13 +9,13 @@
 namespace supine::simulation {
 namespace {
 
-constexpr int first_judged = 6;  // the residual goes up and down before it falls steadily
+constexpr int first_judged = 6;         // iterations: the residual goes up and down before it falls steadily
+constexpr int gram_schmidt_passes = 2;  // one loses orthogonality when the residual has fallen far
 
 }  // namespace
 
 KrylovReport Krylov::conjugate_gradients(const LinearMap& matrix, const LinearMap& preconditioner,
-                                         const Eigen::VectorXd& b, double tolerance, int max_iterations,
-                                         Eigen::VectorXd& x, double worth) {
+                                         const Eigen::VectorXd& b, const KrylovOptions& options, Eigen::VectorXd& x) {
   for (Eigen::VectorXd* work : {&r_, &z_, &p_, &q_}) work->resize(size_);
   KrylovReport report;
   x.setZero(size_);
@@ -24,7 +24,7 @@ KrylovReport Krylov::conjugate_gradients(const LinearMap& matrix, const LinearMa
   if (report.converged) return report;
   r_ = b;
   double rho = 0;
-  while (report.iterations < max_iterations) {
+  while (report.iterations < options.max_iterations) {
     preconditioner(r_, z_);
     const double rho_before = rho;
     rho = r_.dot(z_);
@@ -41,15 +41,17 @@ KrylovReport Krylov::conjugate_gradients(const LinearMap& matrix, const LinearMa
     x += alpha * p_;
     r_ -= alpha * q_;
     report.reduction = r_.norm() / norm;
-    report.converged = report.reduction <= tolerance;
-    const double on_the_way = std::pow(worth, static_cast<double>(report.iterations) / max_iterations);
-    if (report.converged || (report.iterations >= first_judged && report.reduction > on_the_way)) break;
+    report.converged = report.reduction <= options.tolerance;
+    const double share_of_iterations = static_cast<double>(report.iterations) / options.max_iterations;
+    const double on_schedule = std::pow(options.worthwhile_reduction, share_of_iterations);
+    if (report.converged || (report.iterations >= first_judged && report.reduction > on_schedule)) break;
   }
   return report;
 }
 
 KrylovReport Krylov::gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b,
-                           double tolerance, int max_iterations, Eigen::VectorXd& x) {
+                           const KrylovOptions& options, Eigen::VectorXd& x) {
+  const int max_iterations = options.max_iterations;
   z_.resize(size_);
   q_.resize(size_);
   if (basis_.cols() < max_iterations + 1) basis_.resize(size_, max_iterations + 1);
@@ -68,8 +70,7 @@ KrylovReport Krylov::gmres(const LinearMap& matrix, const LinearMap& preconditio
     q_ = basis_.col(k);
     preconditioner(q_, z_);
     matrix(z_, q_);
-    // Twice: one pass of Gram-Schmidt loses orthogonality when the residual has fallen far.
-    for (int pass = 0; pass < 2; ++pass) {
+    for (int pass = 0; pass < gram_schmidt_passes; ++pass) {
       const Eigen::VectorXd along = basis_.leftCols(k + 1).transpose() * q_;
       q_.noalias() -= basis_.leftCols(k + 1) * along;
       h.col(k).head(k + 1) += along;
@@ -82,7 +83,7 @@ KrylovReport Krylov::gmres(const LinearMap& matrix, const LinearMap& preconditio
     g.applyOnTheLeft(k, k + 1, rotations[k].adjoint());
     ++k;
     report.reduction = std::abs(g[k]);
-    report.converged = report.reduction <= tolerance;
+    report.converged = report.reduction <= options.tolerance;
   }
   report.iterations = k;
   const Eigen::VectorXd y = h.topLeftCorner(k, k).triangularView<Eigen::Upper>().solve(g.head(k));

@@ -9,7 +9,7 @@
 
 namespace supine::simulation {
 
-/// Applies a matrix or its approximate inverse: out = A in. @p out has the right size already.
+/// Applies a matrix or its approximate inverse: out = A in. @p out has the right size already; it is not @p in.
 using LinearMap = std::function<void(const Eigen::VectorXd& in, Eigen::VectorXd& out)>;
 
 struct KrylovReport {
@@ -19,28 +19,37 @@ struct KrylovReport {
   bool negative_curvature = false;  ///< conjugate gradients met a direction v with vᵀ A v <= 0
 };
 
-/// Preconditioned Krylov solvers for one size; the basis is allocated once and kept.
+struct KrylovOptions {
+  double tolerance = 1e-6;   ///< of the reduction, > 0
+  int max_iterations = 100;  ///< > 0
+  /// Conjugate gradients give up where the residual falls too slowly to come to this reduction in max_iterations.
+  double worthwhile_reduction = std::numeric_limits<double>::infinity();
+};
+
+/// Preconditioned Krylov solvers for A x = b of one size; the basis is allocated once and kept.
 class Krylov {
  public:
+  /// @param size  of b and x
   explicit Krylov(Eigen::Index size) : size_(size) {}
 
   /// Conjugate gradients (Hestenes and Stiefel 1952) for symmetric positive definite A and preconditioner, from x = 0.
   /// Where A is not positive definite they stop at the first direction that shows it, x still one of descent of
   /// ½ xᵀ A x - bᵀ x (Steihaug 1983).
-  /// @param worth  gives up when the residual falls too slowly to come to this reduction in max_iterations
+  /// @param preconditioner  approximate A⁻¹
+  /// @param x  out: what was reached, whether converged or not; zero for b = 0
   KrylovReport conjugate_gradients(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b,
-                                   double tolerance, int max_iterations, Eigen::VectorXd& x,
-                                   double worth = std::numeric_limits<double>::infinity());
+                                   const KrylovOptions& options, Eigen::VectorXd& x);
 
   /// GMRES without restart (Saad and Schultz 1986), preconditioned from the right so that its residual is the true
-  /// one, from x = 0.
+  /// one, from x = 0; any regular A. Parameters as of conjugate_gradients(); the basis takes max_iterations + 1 vectors
+  /// of memory.
   KrylovReport gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b,
-                     double tolerance, int max_iterations, Eigen::VectorXd& x);
+                     const KrylovOptions& options, Eigen::VectorXd& x);
 
  private:
   Eigen::Index size_;
-  Eigen::VectorXd r_, z_, p_, q_;
-  Eigen::MatrixXd basis_;
+  Eigen::VectorXd r_, z_, p_, q_;  // residual, preconditioned residual, direction, A times direction
+  Eigen::MatrixXd basis_;          // of GMRES, one vector per column
 };
 
 }  // namespace supine::simulation

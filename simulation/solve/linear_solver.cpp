@@ -22,6 +22,15 @@ int openblas_get_num_threads(void);
 namespace supine::simulation {
 namespace {
 
+// A factorisation works in cache, a solve fetches every entry twice, and a Krylov iteration takes more than the solve:
+// measured, in floating-point operations per entry of the factor.
+constexpr double operations_per_fetch = 80;
+
+#ifdef SUPINE_WITH_PETSC
+// Dofs. Where a Cholesky factor takes about ten seconds and two gigabytes a multigrid cycle is cheaper many times over.
+constexpr Eigen::Index largest_direct = 100'000;
+#endif
+
 void use_one_blas_thread() { openblas_set_num_threads(1); }
 
 /// CHOLMOD asks for four threads whatever OMP_NUM_THREADS says; on two cores they cost more than they give.
@@ -62,10 +71,12 @@ struct CholeskySolver::State {
 
 namespace {
 
+constexpr int lower_triangle = -1;  // cholmod_sparse::stype: symmetric, only that triangle is read
+
 /// The lower triangle of @p matrix as CHOLMOD sees it; the data are not copied.
 cholmod_sparse lower_view(const SparseMatrix& matrix) {
   cholmod_sparse view = Eigen::viewAsCholmod(const_cast<SparseMatrix&>(matrix));
-  view.stype = -1;
+  view.stype = lower_triangle;
   return view;
 }
 
@@ -84,7 +95,7 @@ std::vector<int> node_ordering(const SparseMatrix& matrix, cholmod_common& commo
   graph.nzmax = rows.size();
   graph.p = first.data();
   graph.i = rows.data();
-  graph.stype = -1;
+  graph.stype = lower_triangle;
   graph.itype = CHOLMOD_INT;
   graph.xtype = CHOLMOD_PATTERN;
   graph.sorted = graph.packed = 1;
@@ -113,9 +124,7 @@ CholeskySolver::CholeskySolver(const SparseMatrix& pattern) : state_(std::make_u
 CholeskySolver::~CholeskySolver() = default;
 
 double CholeskySolver::solves_per_factor() const {
-  // A factorisation works in cache, a solve fetches every entry twice, and a Krylov iteration takes more
-  // than the solve: measured, about 80 operations per fetch.
-  return state_->common.lnz > 0 ? state_->common.fl / (80.0 * state_->common.lnz) : 1;
+  return state_->common.lnz > 0 ? state_->common.fl / (operations_per_fetch * state_->common.lnz) : 1;
 }
 
 bool CholeskySolver::factorise(const SparseMatrix& matrix, double shift) {
@@ -184,8 +193,6 @@ Eigen::VectorXd LuSolver::solve_transposed(const Eigen::VectorXd& right_hand_sid
 
 std::unique_ptr<SpdSolver> make_spd_solver(const SparseMatrix& pattern, [[maybe_unused]] const Points& nodes) {
 #ifdef SUPINE_WITH_PETSC
-  // Where a Cholesky factor takes about ten seconds and two gigabytes a multigrid cycle is cheaper many times over.
-  constexpr Eigen::Index largest_direct = 100'000;
   if (pattern.cols() > largest_direct) return std::make_unique<MultigridSolver>(pattern, nodes);
 #endif
   return std::make_unique<CholeskySolver>(pattern);

@@ -10,11 +10,16 @@ namespace supine::simulation {
 
 /// Cholesky factors of symmetric matrices with 3 by 3 node blocks; one analysis, many numeric factorisations.
 /// BLAS runs on one thread, so that results do not depend on the number of threads.
+/// @pre  factorise() returned true before any solve()
 class CholeskySolver : public SpdSolver {
  public:
+  /// @param pattern  as Pattern::zero_matrix() makes it, 3 #N by 3 #N; values are not read
+  /// @throws NumericalFailure  out of memory
   explicit CholeskySolver(const SparseMatrix& pattern);
   ~CholeskySolver() override;
+  /// @throws NumericalFailure  out of memory
   bool factorise(const SparseMatrix& matrix, double shift = 0) override;
+  /// Not from two threads at once: the work space is the object's.
   void solve(const Eigen::VectorXd& right_hand_side, Eigen::VectorXd& solution) const override;
   Eigen::VectorXd solve(const Eigen::VectorXd& right_hand_side) const;
   double solves_per_factor() const override;
@@ -26,13 +31,18 @@ class CholeskySolver : public SpdSolver {
 };
 
 /// LU factors of unsymmetric matrices with a symmetric pattern; one analysis, many numeric factorisations.
+/// @pre  factorise() returned true before any solve
 class LuSolver {
  public:
+  /// @param pattern  square; values are not read
   explicit LuSolver(const SparseMatrix& pattern);
   ~LuSolver();
-  /// @return false when the matrix is singular
+  /// @param matrix  with the pattern given to the constructor; copied
+  /// @return false when the matrix is singular, or memory ran out
   bool factorise(const SparseMatrix& matrix);
+  /// A⁻¹ right_hand_side
   Eigen::VectorXd solve(const Eigen::VectorXd& right_hand_side) const;
+  /// A⁻ᵀ right_hand_side
   Eigen::VectorXd solve_transposed(const Eigen::VectorXd& right_hand_side) const;
 
  private:

@@ -11,37 +11,46 @@
 namespace supine::simulation {
 namespace {
 
-constexpr int max_gmres = 120;
-constexpr int max_conjugate_gradients = 200;
-constexpr double shift_growth = 6;        // from one try to the next
+// Iterations, however cheap a new factor is and however dear.
+constexpr int least_conjugate_gradients = 4, max_conjugate_gradients = 200;
+constexpr int least_gmres = 8, max_gmres = 120;  // fewer at most: every iteration keeps a vector of the basis
+// Which matrix is factorised: the exact tangent, the convex one, then that with growing shifts. The last shift is at
+// least 28 times the mean of the diagonal: a step with so stiff a matrix leads nowhere.
+constexpr int exact_tangent = 0, convex_tangent = 1, first_shifted = 2, max_tangents = 10;
+constexpr double first_shift = 1e-4;  // share of the mean of the diagonal: small beside most stiffnesses
+constexpr double shift_growth = 6;    // from one try to the next
+// When the kept factor is used again, and when its Krylov solve will do.
 constexpr double close_mm = 1;            // a kept factor is worth trying after steps shorter than this
 constexpr double many_solves = 40;        // or where a new one costs as much as so many solves
 constexpr double usable_reduction = 0.5;  // a linear solve that got this far is still a direction
 constexpr double worth_reduction = 0.1;   // and this far one that saves a new factor
+constexpr int undeformed_tries = 2;       // with the kept factor, then with a new one
 
 }  // namespace
 
 NewtonDirection::NewtonDirection(const Mechanics& mechanics)
     : mechanics_(mechanics), krylov_(mechanics.pattern().dofs()) {}
 
-int NewtonDirection::worth_of_factor(int least, int most) const {
+/// Krylov iterations that cost as much as a new factor, from @p least to @p most.
+int NewtonDirection::iterations_per_factor(int least, int most) const {
   return std::clamp(static_cast<int>(factor_->solves_per_factor()), least, most);
 }
 
 bool NewtonDirection::deformed(const State& state, double tolerance, double moved_mm, Sums& sums,
                                Eigen::VectorXd& step) {
-  exact_ = true, bent_ = false;
+  exact_ = true, indefinite_ = false;
   const bool close = moved_mm < close_mm;
   if (!mechanics_.has_energy()) {  // ∂r/∂x is not symmetric: its lower half only preconditions
-    if ((!have_factor_ || outworn_) && !factorise(state, tolerance, close, sums, nullptr)) return false;
+    if ((!have_factor_ || renew_factor_) && !factorise(state, tolerance, close, sums, nullptr)) return false;
     if (!exact_) mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true}, sums);
     exact_ = true;  // the factor may be of a changed tangent, GMRES solves with the matrix itself
     const auto preconditioner = [this](const Eigen::VectorXd& in, Eigen::VectorXd& out) { factor_->solve(in, out); };
     return by_gmres(sums.tangent, preconditioner, tolerance, sums, step);
   }
-  const bool worth_trying = have_factor_ && !outworn_ && (close || factor_->solves_per_factor() >= many_solves);
-  if (worth_trying && by_conjugate_gradients(tolerance, 0, worth_of_factor(4, max_conjugate_gradients), sums, step))
-    return true;
+  if (have_factor_ && !renew_factor_ && (close || factor_->solves_per_factor() >= many_solves)) {
+    const int affordable = iterations_per_factor(least_conjugate_gradients, max_conjugate_gradients);
+    if (by_conjugate_gradients(tolerance, 0, affordable, sums, step)) return true;
+  }
   return factorise(state, tolerance, close, sums, &step);
 }
 
@@ -58,9 +67,9 @@ bool NewtonDirection::undeformed(const State& state, double tolerance, Sums& sum
       at = (back[n] * at).eval();
     }
   };
-  bent_ = false;
-  for (int attempt = 0; attempt < 2; ++attempt) {
-    const bool fresh = !have_factor_ || outworn_;
+  indefinite_ = false;
+  for (int attempt = 0; attempt < undeformed_tries; ++attempt) {
+    const bool fresh = !have_factor_ || renew_factor_;
     if (fresh) {
       mechanics_.evaluate(state, Demand{.residual = true, .tangent = true, .reference_tangent = true}, sums);
       if (!factorise(state, tolerance, false, sums, nullptr)) return false;
@@ -68,17 +77,18 @@ bool NewtonDirection::undeformed(const State& state, double tolerance, Sums& sum
     exact_ = true;  // the factor may be of a changed tangent, GMRES solves with the matrix itself
     if (by_gmres(sums.reference_tangent, preconditioner, tolerance, sums, step)) return true;
     if (fresh) return false;
-    outworn_ = true;
+    renew_factor_ = true;
   }
   return false;
 }
 
 double NewtonDirection::natural_mm(const Eigen::VectorXd& residual) {
   if (!have_factor_) return std::numeric_limits<double>::quiet_NaN();
-  factor_->solve(residual, natural_);
-  return natural_.norm();
+  factor_->solve(residual, preconditioned_residual_);
+  return preconditioned_residual_.norm();
 }
 
+/// Renews the kept factor.
 /// @param close  whether the last step was short
 /// @param step   the Newton step with the new factor, or nullptr when only the factor is wanted
 bool NewtonDirection::factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step) {
@@ -88,33 +98,36 @@ bool NewtonDirection::factorise(const State& state, double tolerance, bool close
   // last one that did.
   double shift = 0;
   have_factor_ = true;
-  for (int attempt = bent_ ? 1 : 0; attempt < 10; ++attempt) {
-    if (attempt == 1)
+  for (int tangent = indefinite_ ? convex_tangent : exact_tangent; tangent < max_tangents; ++tangent) {
+    if (tangent == convex_tangent)
       mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true, .convex = true}, sums);
-    else if (attempt == 2)
-      shift = std::max(1e-4 * sums.tangent.diagonal().cwiseAbs().mean(), shift_ / shift_growth);
-    else if (attempt > 2)
+    else if (tangent == first_shifted)
+      shift = std::max(first_shift * sums.tangent.diagonal().cwiseAbs().mean(), shift_ / shift_growth);
+    else if (tangent > first_shifted)
       shift *= shift_growth;
     ++factorisations_;
-    exact_ = attempt == 0;
+    const bool exact = tangent == exact_tangent;
+    exact_ = exact;
     if (!factor_->factorise(sums.tangent, shift)) continue;
-    outworn_ = false;
+    renew_factor_ = false;
     const bool found = step == nullptr || step_with_new_factor(state, tolerance, shift, close, sums, *step);
     // A cycle of multigrid is no factor: it is good for a changed tangent, not for what that was changed from.
-    if (attempt > 0 && !factor_->direct()) outworn_ = true;
-    if (found && attempt > 0) shift_ = shift;
+    if (!exact && !factor_->direct()) renew_factor_ = true;
+    if (found && !exact) shift_ = shift;
     if (found) return true;
   }
   have_factor_ = false;
   return false;
 }
 
+/// The step with the factor just made of sums.tangent + shift I.
 bool NewtonDirection::step_with_new_factor(const State& state, double tolerance, double shift, bool close, Sums& sums,
                                            Eigen::VectorXd& step) {
   const bool exact = exact_;
   if (!exact && close && factor_->direct()) {
     mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true}, sums);
-    if (by_conjugate_gradients(tolerance, 0, worth_of_factor(4, max_conjugate_gradients), sums, step)) return true;
+    const int affordable = iterations_per_factor(least_conjugate_gradients, max_conjugate_gradients);
+    if (by_conjugate_gradients(tolerance, 0, affordable, sums, step)) return true;
   }
   bool found = true;
   if (factor_->direct())
@@ -125,30 +138,33 @@ bool NewtonDirection::step_with_new_factor(const State& state, double tolerance,
   return found && step.allFinite();
 }
 
-/// With the kept factor on sums.tangent. Sets exact_ and bent_ by whether that showed negative curvature.
-bool NewtonDirection::by_conjugate_gradients(double tolerance, double shift, int most, const Sums& sums,
+/// With the kept factor on sums.tangent + shift I. Sets exact_ and indefinite_ by whether that showed negative
+/// curvature.
+bool NewtonDirection::by_conjugate_gradients(double tolerance, double shift, int max_iterations, const Sums& sums,
                                              Eigen::VectorXd& step) {
   const auto matrix = [&sums, shift](const Eigen::VectorXd& in, Eigen::VectorXd& out) {
     out.noalias() = sums.tangent.transpose() * in;  // symmetric; the transposed product runs in parallel
     if (shift != 0) out += shift * in;
   };
   const auto preconditioner = [this](const Eigen::VectorXd& in, Eigen::VectorXd& out) { factor_->solve(in, out); };
-  const double worth = factor_->direct() ? worth_reduction : std::numeric_limits<double>::infinity();
-  const KrylovReport report =
-      krylov_.conjugate_gradients(matrix, preconditioner, -sums.residual, tolerance, most, step, worth);
-  outworn_ = 2 * report.iterations > most;
-  bent_ = report.negative_curvature;
-  exact_ = !bent_;
-  const double enough = bent_ && factor_->direct() ? usable_reduction : worth_reduction;
-  const bool usable = report.converged || ((factor_->direct() || !bent_) && report.reduction <= enough);
+  KrylovOptions options{.tolerance = tolerance, .max_iterations = max_iterations};
+  if (factor_->direct()) options.worthwhile_reduction = worth_reduction;
+  const KrylovReport report = krylov_.conjugate_gradients(matrix, preconditioner, -sums.residual, options, step);
+  renew_factor_ = report.iterations > max_iterations / 2;  // the factor is kept for as long as it is clearly cheaper
+  indefinite_ = report.negative_curvature;
+  exact_ = !indefinite_;
+  const double enough = indefinite_ && factor_->direct() ? usable_reduction : worth_reduction;
+  const bool usable = report.converged || ((factor_->direct() || !indefinite_) && report.reduction <= enough);
   return usable && step.allFinite();
 }
 
+/// With the kept factor, maybe of another matrix, inside @p preconditioner.
 bool NewtonDirection::by_gmres(const SparseMatrix& matrix, const LinearMap& preconditioner, double tolerance,
                                const Sums& sums, Eigen::VectorXd& step) {
   const auto product = [&matrix](const Eigen::VectorXd& in, Eigen::VectorXd& out) { out.noalias() = matrix * in; };
-  const KrylovReport report = krylov_.gmres(product, preconditioner, -sums.residual, tolerance, max_gmres, step);
-  outworn_ = report.iterations > worth_of_factor(8, max_gmres);
+  const KrylovOptions options{.tolerance = tolerance, .max_iterations = max_gmres};
+  const KrylovReport report = krylov_.gmres(product, preconditioner, -sums.residual, options, step);
+  renew_factor_ = report.iterations > iterations_per_factor(least_gmres, max_gmres);
   return report.reduction < usable_reduction && step.allFinite();
 }
 

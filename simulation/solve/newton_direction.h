@@ -19,21 +19,26 @@ namespace supine::simulation {
 /// serves the inverse solve, whose matrix is not symmetric and would cost three times as much to factorise.
 class NewtonDirection {
  public:
+  /// @param mechanics  must outlive the object
   explicit NewtonDirection(const Mechanics& mechanics);
 
-  /// Step for the deformed shape. @p sums holds residual and tangent at @p state; they are evaluated again with
-  /// Demand::convex where the tangent is not positive definite.
-  /// @param tolerance  of the linear solve, relative to |r|
+  /// Step for the deformed shape.
+  /// @param sums  residual, energy and tangent at @p state; where that tangent is not positive definite it is evaluated
+  ///   again with Demand::convex, and may be left so
+  /// @param tolerance  of the linear solve, relative to |r|, in (0, 1)
   /// @param moved_mm   how far the last step went: what says whether the kept factor is still close
+  /// @param step  out: s, mm, dof 3 node + axis; one of descent of the energy where there is one
   /// @return false when no step was found
+  /// @throws NumericalFailure  out of memory
   bool deformed(const State& state, double tolerance, double moved_mm, Sums& sums, Eigen::VectorXd& step);
 
-  /// Step for the undeformed shape. @p sums holds residual and reference tangent at @p state.
+  /// Step for the undeformed shape. @p sums holds residual and reference tangent at @p state; else as deformed().
   bool undeformed(const State& state, double tolerance, Sums& sums, Eigen::VectorXd& step);
 
   /// How far the kept factor would move the nodes to take @p residual away, mm: root of the sum of squares. The measure
   /// of progress that does not depend on how stiff a body is in which direction (Deuflhard, Newton Methods for
   /// Nonlinear Problems, 2004, section 3.3); not a number without a factor.
+  /// @param residual  mN, dof 3 node + axis
   double natural_mm(const Eigen::VectorXd& residual);
 
   /// Forgets the kept factor, so that what follows does not depend on what was solved before.
@@ -41,26 +46,28 @@ class NewtonDirection {
 
   /// Whether the last step came from the exact tangent: its length then says how far the answer is.
   bool exact() const { return exact_; }
+  /// How many there were since the object was made, those that failed included.
   int factorisations() const { return factorisations_; }
 
  private:
   bool factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step);
   bool step_with_new_factor(const State& state, double tolerance, double shift, bool close, Sums& sums,
                             Eigen::VectorXd& step);
-  bool by_conjugate_gradients(double tolerance, double shift, int most, const Sums& sums, Eigen::VectorXd& step);
+  bool by_conjugate_gradients(double tolerance, double shift, int max_iterations, const Sums& sums,
+                              Eigen::VectorXd& step);
   bool by_gmres(const SparseMatrix& matrix, const LinearMap& preconditioner, double tolerance, const Sums& sums,
                 Eigen::VectorXd& step);
-  int worth_of_factor(int least, int most) const;  // Krylov iterations that cost as much as a new factor, cut at both
+  int iterations_per_factor(int least, int most) const;
 
   const Mechanics& mechanics_;
   std::unique_ptr<SpdSolver> factor_;
   Krylov krylov_;
-  Eigen::VectorXd natural_;  // work space
+  Eigen::VectorXd preconditioned_residual_;  // work space
   bool have_factor_ = false;
-  bool outworn_ = false;  // the last Krylov solve cost more than a new factor would
+  bool renew_factor_ = false;  // the last Krylov solve cost more than a new factor would
   bool exact_ = true;
-  bool bent_ = false;  // this step's exact tangent has shown negative curvature: it has no Cholesky factor
-  double shift_ = 0;   // of the tangent that was factorised last when the exact one was not positive definite
+  bool indefinite_ = false;  // this step's exact tangent has shown negative curvature: it has no Cholesky factor
+  double shift_ = 0;         // of the tangent that was factorised last when the exact one was not positive definite
   int factorisations_ = 0;
 };
 

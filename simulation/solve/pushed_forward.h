@@ -12,6 +12,7 @@ namespace supine::simulation {
 /// the identity where there is none.
 /// @param cells  #C by 4 or 10, corners first
 /// @param x, X   deformed and undeformed nodes, #N by 3, mm
+/// @return  F_iJ = ∂x_i/∂X_J, one per node
 std::vector<Eigen::Matrix3d> nodal_deformation(const Indices& cells, const Points& x, const Points& X);
 
 /// A deformed shape for a body whose undeformed shape is a little different: x + F (X' - X), with F at the nodes. To

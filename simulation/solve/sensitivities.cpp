@@ -23,9 +23,9 @@ using Spare = std::vector<std::unique_ptr<Solver>>;
 
 /// A solver taken from @p spare, or a new one; given back when it goes.
 template <class Solver>
-class Lent {
+class Borrowed {
  public:
-  Lent(Spare<Solver>& spare, const SparseMatrix& pattern) : spare_(spare) {
+  Borrowed(Spare<Solver>& spare, const SparseMatrix& pattern) : spare_(spare) {
     if (spare.empty()) {
       solver_ = std::make_unique<Solver>(pattern);
     } else {
@@ -33,9 +33,9 @@ class Lent {
       spare.pop_back();
     }
   }
-  ~Lent() { spare_.push_back(std::move(solver_)); }
-  Lent(const Lent&) = delete;
-  Lent& operator=(const Lent&) = delete;
+  ~Borrowed() { spare_.push_back(std::move(solver_)); }
+  Borrowed(const Borrowed&) = delete;
+  Borrowed& operator=(const Borrowed&) = delete;
   Solver* operator->() const { return solver_.get(); }
 
  private:
@@ -62,8 +62,8 @@ class TangentSolver {
   }
 
  private:
-  std::optional<Lent<CholeskySolver>> cholesky_;
-  std::optional<Lent<LuSolver>> lu_;
+  std::optional<Borrowed<CholeskySolver>> cholesky_;
+  std::optional<Borrowed<LuSolver>> lu_;
 };
 
 }  // namespace
@@ -74,7 +74,7 @@ struct Sensitivities::State {
   ChainSolution solution;
   Sums sums;
   SparseMatrix prone_tangent;  // ∂r/∂x of prone: what moving the known shape does
-  std::optional<Lent<LuSolver>> inverse;
+  std::optional<Borrowed<LuSolver>> inverse;
   std::vector<std::unique_ptr<TangentSolver>> tangents;  // per pose but prone
   std::vector<SparseMatrix> reference_tangents;          // ∂r/∂X, per pose but prone
 

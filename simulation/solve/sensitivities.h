@@ -11,9 +11,9 @@ namespace supine::simulation {
 
 /// What one parameter moves, per unit of it.
 struct ChainDerivative {
-  Points prone;               ///< of the known shape, mm per unit; zero unless the parameter moves the imaged skin
-  Points X;                   ///< of the undeformed shape
-  std::vector<Points> poses;  ///< of every pose, in the order of ChainSolution::poses
+  Points prone;  ///< of the known shape, #N by 3, mm per unit; zero unless the parameter moves the imaged skin
+  Points X;      ///< of the undeformed shape, the same
+  std::vector<Points> poses;  ///< of every pose, the same, in the order of ChainSolution::poses
 };
 
 /// Exact derivatives of a solved chain with respect to any parameter of the base model or the catalogue, whether its
@@ -23,8 +23,9 @@ struct ChainDerivative {
 /// and parameter after that.
 class Sensitivities {
  public:
-  /// @param solution  of @p model by @p chain. The chain must outlive the object, which lends it analysed solvers.
-  /// @throws NumericalFailure  a pose at which the tangent is singular
+  /// @param chain  must outlive the object, which borrows analysed solvers of it and sets its fields
+  /// @param solution  of @p model by @p chain, with every pose; copied
+  /// @throws NumericalFailure  a shape at which the tangent is singular
   Sensitivities(Chain& chain, const Model& model, const ChainSolution& solution);
   ~Sensitivities();
 
@@ -34,7 +35,9 @@ class Sensitivities {
 
   /// Gradient of a scalar J(x of every pose) by the adjoint method: two back-substitutions in all, whatever the number
   /// of parameters.
-  /// @param by_pose  ∂J/∂x of each pose, in the order of ChainSolution::poses, per mm
+  /// @param by_pose  ∂J/∂x of each pose, #N by 3, in the order of ChainSolution::poses, per mm
+  /// @return dJ/dp, one per parameter, per unit of it
+  /// @throws InputError  no such parameter
   Eigen::VectorXd gradient(const std::vector<Points>& by_pose, const std::vector<std::string>& parameters) const;
 
  private:

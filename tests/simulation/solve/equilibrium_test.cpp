@@ -146,6 +146,31 @@ TEST(Chain, TooSoftATissueIsRefusedWithTheLoadReached) {
   }
 }
 
+SolveReport forward_box(const SolveOptions& options) {
+  const BoxChain box;
+  Chain chain(box.scene.mesh, box.scene.anatomy, box.model, box_poses, options);
+  return chain.solve(box.model).poses[0].report;
+}
+
+TEST(Equilibrium, SaysWhichBoundEndedTheSolve) {
+  const SolveReport by_residual = forward_box({.step_tolerance_mm = 0, .residual_tolerance = 1e-6, .progress = {}});
+  EXPECT_EQ(by_residual.termination, Termination::residual_small);
+  EXPECT_LE(by_residual.residual_share, 1e-6);
+  const SolveReport by_step = forward_box({.step_tolerance_mm = 1e-3, .residual_tolerance = 0, .progress = {}});
+  EXPECT_EQ(by_step.termination, Termination::step_small);
+  EXPECT_LE(by_step.residual_share, loosest_residual_share);
+}
+
+TEST(Equilibrium, TooFewIterationsAreNamed) {
+  try {
+    forward_box({.max_iterations = 1, .smallest_load_step = 1, .progress = {}});
+    FAIL() << "one Newton step was enough";
+  } catch (const NumericalFailure& failure) {
+    const std::string message = failure.what();
+    EXPECT_NE(message.find("beyond 0 % of gravity (no convergence in 1 iterations"), std::string::npos) << message;
+  }
+}
+
 TEST(Chain, ProneGravityIntoTheMuscleIsRefused) {
   const BoxChain chain;
   EXPECT_THROW(chain.solve({{"prone", -Eigen::Vector3d::UnitZ()}, {"supine", Eigen::Vector3d::UnitZ()}}), InputError);

@@ -66,10 +66,11 @@ TEST_F(LinearSolversTest, KrylovReachesTheAskedTolerance) {
   Krylov krylov(b.size());
   Eigen::VectorXd x;
   for (const double tolerance : {1e-2, 1e-9}) {
-    const auto cg = krylov.conjugate_gradients(by(sums->tangent), inverse, b, tolerance, 500, x);
+    const KrylovOptions options{.tolerance = tolerance, .max_iterations = 500};
+    const auto cg = krylov.conjugate_gradients(by(sums->tangent), inverse, b, options, x);
     EXPECT_TRUE(cg.converged);
     EXPECT_LE((sums->tangent * x - b).norm(), 1.01 * tolerance * b.norm());
-    const auto gmres = krylov.gmres(by(sums->reference_tangent), inverse, b, tolerance, 500, x);
+    const auto gmres = krylov.gmres(by(sums->reference_tangent), inverse, b, options, x);
     EXPECT_TRUE(gmres.converged);
     EXPECT_LE((sums->reference_tangent * x - b).norm(), 1.01 * tolerance * b.norm());
   }
@@ -82,7 +83,7 @@ TEST_F(LinearSolversTest, ConjugateGradientsReportNegativeCurvature) {
   const auto turned = [&](const Eigen::VectorXd& in, Eigen::VectorXd& out) { out = -(sums->tangent * in); };
   Krylov krylov(b.size());
   Eigen::VectorXd x;
-  const auto report = krylov.conjugate_gradients(turned, inverse, b, 1e-6, 100, x);
+  const auto report = krylov.conjugate_gradients(turned, inverse, b, {.tolerance = 1e-6, .max_iterations = 100}, x);
   EXPECT_TRUE(report.negative_curvature);
   EXPECT_FALSE(report.converged);
 }
@@ -99,7 +100,7 @@ TEST_F(LinearSolversTest, ConjugateGradientsStopOnADescentWhereTheMatrixIsNotDef
   };
   Krylov krylov(b.size());
   Eigen::VectorXd x, product(b.size());
-  const auto report = krylov.conjugate_gradients(bent, inverse, b, 1e-9, 500, x);
+  const auto report = krylov.conjugate_gradients(bent, inverse, b, {.tolerance = 1e-9, .max_iterations = 500}, x);
   ASSERT_TRUE(report.negative_curvature);
   ASSERT_GT(report.iterations, 0);
   bent(x, product);
@@ -116,7 +117,8 @@ TEST_F(LinearSolversTest, ConjugateGradientsGiveUpWhereTheyAreTooSlow) {
   Krylov krylov(b.size());
   Eigen::VectorXd x;
   const auto iterations = [&](const LinearMap& preconditioner, double tolerance, double worth) {
-    return krylov.conjugate_gradients(matrix, preconditioner, b, tolerance, 60, x, worth).iterations;
+    const KrylovOptions options{.tolerance = tolerance, .max_iterations = 60, .worthwhile_reduction = worth};
+    return krylov.conjugate_gradients(matrix, preconditioner, b, options, x).iterations;
   };
   const double patient = std::numeric_limits<double>::infinity();
   ASSERT_EQ(iterations(nothing, 1e-12, patient), 60);
