@@ -46,6 +46,14 @@ std::string printed(const toml::node& node) {
   return text.str();
 }
 
+/// ">= 0 and <= 4"; one bound at least is finite.
+std::string printed(const Bounds& bounds) {
+  std::string text;
+  if (std::isfinite(bounds.lower)) text = fmt::format("{} {}", bounds.open ? ">" : ">=", bounds.lower);
+  if (std::isfinite(bounds.upper)) text += fmt::format("{}<= {}", text.empty() ? "" : " and ", bounds.upper);
+  return text;
+}
+
 /// Elements of an array through @p convert, which returns nothing for a wrong type.
 template <class T, class Convert>
 std::vector<T> elements(const TomlReader& reader, std::string_view key, const char* what, Convert convert) {
@@ -64,6 +72,18 @@ std::optional<double> finite_number(const toml::node& node) {
   if (!node.is_number()) return {};
   const double number = *node.value<double>();
   return std::isfinite(number) ? std::optional(number) : std::nullopt;
+}
+
+std::optional<Eigen::Vector3d> three_numbers(const toml::node& node) {
+  const toml::array* array = node.as_array();
+  if (!array || array->size() != 3) return {};
+  Eigen::Vector3d vector;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto number = finite_number((*array)[static_cast<std::size_t>(axis)]);
+    if (!number) return {};
+    vector[axis] = *number;
+  }
+  return vector;
 }
 
 std::optional<int> small_integer(const toml::node& node) {
@@ -85,6 +105,11 @@ std::string nearest_name(std::string_view name, const std::vector<std::string>& 
     nearest = candidate;
   }
   return nearest;
+}
+
+std::string suggestion(std::string_view name, const std::vector<std::string>& known) {
+  const std::string nearest = nearest_name(name, known);
+  return nearest.empty() ? "known here: " + listed(known) : fmt::format("did you mean {}?", nearest);
 }
 
 std::string listed(const std::vector<std::string>& names) {
@@ -126,11 +151,23 @@ void TomlReader::fail(std::string_view key, const std::string& complaint) const 
 
 void TomlReader::allow(const std::vector<std::string>& known) const {
   for (const auto& [key, node] : *table_) {
-    if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
-    const std::string nearest = nearest_name(key.str(), known);
-    fail(key.str(), nearest.empty() ? fmt::format("unknown key; known here: {}", listed(known))
-                                    : fmt::format("unknown key; did you mean {}?", nearest));
+    if (std::find(known.begin(), known.end(), key.str()) == known.end())
+      fail(key.str(), "unknown key; " + suggestion(key.str(), known));
   }
+}
+
+bool TomlReader::has(std::string_view key) const {
+  if (std::find(asked_.begin(), asked_.end(), key) == asked_.end()) asked_.emplace_back(key);
+  return table_->contains(key);
+}
+
+void TomlReader::require(std::string_view key) const {
+  if (has(key)) return;
+  std::vector<std::string> others;
+  for (const auto& [other, node] : *table_)
+    if (std::find(asked_.begin(), asked_.end(), other.str()) == asked_.end()) others.emplace_back(other.str());
+  const std::string nearest = nearest_name(key, others);
+  fail(key, "is missing and must be given" + (nearest.empty() ? "" : fmt::format("; is {} meant for it?", nearest)));
 }
 
 std::optional<std::string> TomlReader::text(std::string_view key) const {
@@ -141,11 +178,20 @@ std::optional<std::string> TomlReader::text(std::string_view key) const {
   return value;
 }
 
-std::optional<double> TomlReader::number(std::string_view key) const {
+std::optional<double> TomlReader::number(std::string_view key, const Bounds& bounds) const {
   if (!has(key)) return {};
   const auto value = finite_number(*table_->get(key));
   if (!value) fail(key, "must be a finite number");
+  if (*value < bounds.lower || *value > bounds.upper || (bounds.open && *value == bounds.lower))
+    fail(key, "must be " + printed(bounds));
   return value;
+}
+
+std::optional<int> TomlReader::whole_number(std::string_view key, int lower, int upper) const {
+  const auto value = number(key, {.lower = static_cast<double>(lower), .upper = static_cast<double>(upper)});
+  if (!value) return {};
+  if (*value != std::floor(*value)) fail(key, "must be a whole number");
+  return static_cast<int>(*value);
 }
 
 std::optional<std::vector<std::string>> TomlReader::texts(std::string_view key) const {
@@ -154,14 +200,24 @@ std::optional<std::vector<std::string>> TomlReader::texts(std::string_view key) 
                                [](const toml::node& node) { return node.value_exact<std::string>(); });
 }
 
-std::optional<std::vector<double>> TomlReader::numbers(std::string_view key) const {
-  if (!has(key)) return {};
-  return elements<double>(*this, key, "finite numbers", finite_number);
-}
-
 std::optional<std::vector<int>> TomlReader::integers(std::string_view key) const {
   if (!has(key)) return {};
   return elements<int>(*this, key, "whole numbers", small_integer);
+}
+
+std::optional<Eigen::Vector3d> TomlReader::vector(std::string_view key) const {
+  if (!has(key)) return {};
+  const auto value = three_numbers(*table_->get(key));
+  if (!value) fail(key, "must be three numbers [x, y, z], each finite");
+  return value;
+}
+
+std::optional<std::vector<Eigen::Vector3d>> TomlReader::vectors(std::string_view key) const {
+  if (!has(key)) return {};
+  const char* what = "points of three numbers [x, y, z]";
+  const auto values = elements<Eigen::Vector3d>(*this, key, what, three_numbers);
+  if (values.empty()) fail(key, fmt::format("must not be empty: give {}", what));
+  return values;
 }
 
 std::optional<TomlReader> TomlReader::sub_table(std::string_view key) const {
@@ -173,8 +229,13 @@ std::optional<TomlReader> TomlReader::sub_table(std::string_view key) const {
 }
 
 std::string TomlReader::required_text(std::string_view key) const {
-  if (!has(key)) fail(key, "is missing and must be given");
+  require(key);
   return *text(key);
+}
+
+double TomlReader::required_number(std::string_view key, const Bounds& bounds) const {
+  require(key);
+  return *number(key, bounds);
 }
 
 std::string TomlReader::choice(std::string_view key, const std::vector<std::string>& values,
