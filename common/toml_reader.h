@@ -14,16 +14,6 @@
 
 namespace supine {
 
-/// The name of @p known that is closest to @p name by edit distance (a swap of neighbours is one edit); empty when
-/// none is close (more than a third of the letters differ).
-std::string nearest_name(std::string_view name, const std::vector<std::string>& known);
-
-/// "did you mean NAME?" with the nearest name, or else "known here: a, b or c".
-std::string suggestion(std::string_view name, const std::vector<std::string>& known);
-
-/// "a", "a or b", "a, b or c".
-std::string listed(const std::vector<std::string>& names);
-
 /// Parses a TOML file.
 /// @throws InputError  naming file, line and column: not there, not TOML, a key written twice
 toml::table parse_toml(const std::filesystem::path& file);

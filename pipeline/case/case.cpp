@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "common/suggestion.h"
 #include "common/toml_reader.h"
 #include "pipeline/case/case_image.h"
 

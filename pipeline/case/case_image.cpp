@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "common/suggestion.h"
 #include "pipeline/case/patient_frame.h"
 #include "segmentation/steps/recipe_toml.h"
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/error.h"
+#include "common/suggestion.h"
 #include "common/toml_reader.h"
 #include "simulation/catalogue.h"
 #include "simulation/laws/bulk_laws.h"

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "common/suggestion.h"
 #include "segmentation/formats/image_formats.h"
 #include "segmentation/steps/step_readers.h"
 

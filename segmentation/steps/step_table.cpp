@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "common/suggestion.h"
+
 namespace supine::segmentation {
 
 std::vector<std::string> StepTable::masks(std::string_view key) const {

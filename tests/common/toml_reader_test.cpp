@@ -6,24 +6,6 @@
 namespace supine::pipeline {
 namespace {
 
-TEST(NearestName, FindsASlipOfTheFinger) {
-  const std::vector<std::string> known = {"ligament", "adhesion", "gravity_tilt"};
-  EXPECT_EQ(nearest_name("ligamnet", known), "ligament");
-  EXPECT_EQ(nearest_name("gravity-tilt", known), "gravity_tilt");
-  EXPECT_EQ(nearest_name("adhesions", known), "adhesion");
-}
-
-TEST(NearestName, IsSilentWhenNothingIsClose) {
-  EXPECT_EQ(nearest_name("temperature", {"ligament", "adhesion"}), "");
-  EXPECT_EQ(nearest_name("x", {"yz"}), "");
-}
-
-TEST(Listed, JoinsWithCommasAndOr) {
-  EXPECT_EQ(listed({"a"}), "a");
-  EXPECT_EQ(listed({"a", "b"}), "a or b");
-  EXPECT_EQ(listed({"a", "b", "c"}), "a, b or c");
-}
-
 TEST(TomlReader, AComplaintNamesFileLineTableKeyAndValue) {
   const toml::table table = toml::parse("\n\n[a]\nb = 3\n");
   const TomlReader file(table, "x.toml", "");
@@ -33,11 +15,6 @@ TEST(TomlReader, AComplaintNamesFileLineTableKeyAndValue) {
 TEST(TomlReader, AnEmptyTextIsRefused) {
   const toml::table table = toml::parse("b = \"\"");
   EXPECT_NE(input_error([&] { TomlReader(table, "x.toml", "").text("b"); }), "");
-}
-
-TEST(Suggestion, IsTheNearestNameOrAllOfThem) {
-  EXPECT_EQ(suggestion("stpe", {"step", "line"}), "did you mean step?");
-  EXPECT_EQ(suggestion("border", {"step", "line"}), "known here: step or line");
 }
 
 /// What a reader of the one-line file @p text complains about when @p use reads it.
