@@ -7,32 +7,15 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <numeric>
 #include <sstream>
 
 #include "common/error.h"
+#include "common/suggestion.h"
 
 namespace supine {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Edits between two words: letters inserted, left out, replaced, or two neighbours swapped
-/// (Levenshtein's distance with transpositions, Damerau 1964, in its restricted form).
-int edit_distance(std::string_view a, std::string_view b) {
-  std::vector<int> before(b.size() + 1), previous(b.size() + 1), row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    before.swap(previous);
-    previous.swap(row);
-    row[0] = static_cast<int>(i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      row[j] = std::min({previous[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1), previous[j] + 1, row[j - 1] + 1});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) row[j] = std::min(row[j], before[j - 2] + 1);
-    }
-  }
-  return row.back();
-}
 
 std::string printed(const toml::node& node) {
   if (const auto text = node.value_exact<std::string>()) return fmt::format("\"{}\"", *text);
@@ -44,6 +27,14 @@ std::string printed(const toml::node& node) {
   }
   node.visit([&text](const auto& value) { text << toml::toml_formatter(value); });
   return text.str();
+}
+
+/// ">= 0 and <= 4"; one bound at least is finite.
+std::string printed(const Bounds& bounds) {
+  std::string text;
+  if (std::isfinite(bounds.lower)) text = fmt::format("{} {}", bounds.open ? ">" : ">=", bounds.lower);
+  if (std::isfinite(bounds.upper)) text += fmt::format("{}<= {}", text.empty() ? "" : " and ", bounds.upper);
+  return text;
 }
 
 /// Elements of an array through @p convert, which returns nothing for a wrong type.
@@ -66,6 +57,18 @@ std::optional<double> finite_number(const toml::node& node) {
   return std::isfinite(number) ? std::optional(number) : std::nullopt;
 }
 
+std::optional<Eigen::Vector3d> three_numbers(const toml::node& node) {
+  const toml::array* array = node.as_array();
+  if (!array || array->size() != 3) return {};
+  Eigen::Vector3d vector;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto number = finite_number((*array)[static_cast<std::size_t>(axis)]);
+    if (!number) return {};
+    vector[axis] = *number;
+  }
+  return vector;
+}
+
 std::optional<int> small_integer(const toml::node& node) {
   if (!node.is_integer()) return {};
   const std::int64_t number = **node.as_integer();
@@ -74,27 +77,6 @@ std::optional<int> small_integer(const toml::node& node) {
 }
 
 }  // namespace
-
-std::string nearest_name(std::string_view name, const std::vector<std::string>& known) {
-  std::string nearest;
-  int smallest = std::max<int>(1, static_cast<int>(name.size()) / 3) + 1;
-  for (const std::string& candidate : known) {
-    const int distance = edit_distance(name, candidate);
-    if (distance >= smallest) continue;
-    smallest = distance;
-    nearest = candidate;
-  }
-  return nearest;
-}
-
-std::string listed(const std::vector<std::string>& names) {
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i > 0) text += i + 1 == names.size() ? " or " : ", ";
-    text += names[i];
-  }
-  return text;
-}
 
 toml::table parse_toml(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -126,11 +108,23 @@ void TomlReader::fail(std::string_view key, const std::string& complaint) const 
 
 void TomlReader::allow(const std::vector<std::string>& known) const {
   for (const auto& [key, node] : *table_) {
-    if (std::find(known.begin(), known.end(), key.str()) != known.end()) continue;
-    const std::string nearest = nearest_name(key.str(), known);
-    fail(key.str(), nearest.empty() ? fmt::format("unknown key; known here: {}", listed(known))
-                                    : fmt::format("unknown key; did you mean {}?", nearest));
+    if (std::find(known.begin(), known.end(), key.str()) == known.end())
+      fail(key.str(), "unknown key; " + suggestion(key.str(), known));
   }
+}
+
+bool TomlReader::has(std::string_view key) const {
+  if (std::find(asked_.begin(), asked_.end(), key) == asked_.end()) asked_.emplace_back(key);
+  return table_->contains(key);
+}
+
+void TomlReader::require(std::string_view key) const {
+  if (has(key)) return;
+  std::vector<std::string> others;
+  for (const auto& [other, node] : *table_)
+    if (std::find(asked_.begin(), asked_.end(), other.str()) == asked_.end()) others.emplace_back(other.str());
+  const std::string nearest = nearest_name(key, others);
+  fail(key, "is missing and must be given" + (nearest.empty() ? "" : fmt::format("; is {} meant for it?", nearest)));
 }
 
 std::optional<std::string> TomlReader::text(std::string_view key) const {
@@ -141,11 +135,20 @@ std::optional<std::string> TomlReader::text(std::string_view key) const {
   return value;
 }
 
-std::optional<double> TomlReader::number(std::string_view key) const {
+std::optional<double> TomlReader::number(std::string_view key, const Bounds& bounds) const {
   if (!has(key)) return {};
   const auto value = finite_number(*table_->get(key));
   if (!value) fail(key, "must be a finite number");
+  if (*value < bounds.lower || *value > bounds.upper || (bounds.open && *value == bounds.lower))
+    fail(key, "must be " + printed(bounds));
   return value;
+}
+
+std::optional<int> TomlReader::whole_number(std::string_view key, int lower, int upper) const {
+  const auto value = number(key, {.lower = static_cast<double>(lower), .upper = static_cast<double>(upper)});
+  if (!value) return {};
+  if (*value != std::floor(*value)) fail(key, "must be a whole number");
+  return static_cast<int>(*value);
 }
 
 std::optional<std::vector<std::string>> TomlReader::texts(std::string_view key) const {
@@ -154,14 +157,24 @@ std::optional<std::vector<std::string>> TomlReader::texts(std::string_view key) 
                                [](const toml::node& node) { return node.value_exact<std::string>(); });
 }
 
-std::optional<std::vector<double>> TomlReader::numbers(std::string_view key) const {
-  if (!has(key)) return {};
-  return elements<double>(*this, key, "finite numbers", finite_number);
-}
-
 std::optional<std::vector<int>> TomlReader::integers(std::string_view key) const {
   if (!has(key)) return {};
   return elements<int>(*this, key, "whole numbers", small_integer);
+}
+
+std::optional<Eigen::Vector3d> TomlReader::vector(std::string_view key) const {
+  if (!has(key)) return {};
+  const auto value = three_numbers(*table_->get(key));
+  if (!value) fail(key, "must be three numbers [x, y, z], each finite");
+  return value;
+}
+
+std::optional<std::vector<Eigen::Vector3d>> TomlReader::vectors(std::string_view key) const {
+  if (!has(key)) return {};
+  const char* what = "points of three numbers [x, y, z]";
+  const auto values = elements<Eigen::Vector3d>(*this, key, what, three_numbers);
+  if (values.empty()) fail(key, fmt::format("must not be empty: give {}", what));
+  return values;
 }
 
 std::optional<TomlReader> TomlReader::sub_table(std::string_view key) const {
@@ -173,8 +186,13 @@ std::optional<TomlReader> TomlReader::sub_table(std::string_view key) const {
 }
 
 std::string TomlReader::required_text(std::string_view key) const {
-  if (!has(key)) fail(key, "is missing and must be given");
+  require(key);
   return *text(key);
+}
+
+double TomlReader::required_number(std::string_view key, const Bounds& bounds) const {
+  require(key);
+  return *number(key, bounds);
 }
 
 std::string TomlReader::choice(std::string_view key, const std::vector<std::string>& values,

@@ -120,7 +120,7 @@ Surface surface_of(const Body& body, const Patches& patches) {
 }
 
 // The formula's place of the middle of an edge between two surface points of one patch.
-Eigen::RowVector3d bent_middle(const Body& body, const Place& a, const Place& b) {
+Eigen::RowVector3d curved_midpoint(const Body& body, const Place& a, const Place& b) {
   Eigen::Vector2d disc = 0.5 * (a.disc + b.disc);
   constexpr double rim = 1 - 1e-9;
   if (a.disc.norm() > rim && b.disc.norm() > rim) disc.normalize();
@@ -133,7 +133,7 @@ void bend(meshing::TetMesh& mesh, const Body& body, const Patches& patches) {
   for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f)
     for (int e = 0; e < 3; ++e)
       mesh.points.row(mesh.faces(f, 3 + e)) =
-          bent_middle(body, patches.places[mesh.faces(f, e)], patches.places[mesh.faces(f, (e + 1) % 3)]);
+          curved_midpoint(body, patches.places[mesh.faces(f, e)], patches.places[mesh.faces(f, (e + 1) % 3)]);
   for (int round = 0; round < 10; ++round) {
     const Eigen::VectorXd det = simulation::cell_det_f(mesh.cells, mesh.points, straight);
     if (det.minCoeff() >= least_det) return;

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "common/error.h"
-#include "reconstruction/prongs.h"
+#include "reconstruction/perforators.h"
 #include "reconstruction/shaping.h"
 
 namespace supine::reconstruction {
@@ -171,12 +171,12 @@ Reconstruction reconstruct(const LabelImage& image, const ReconstructOptions& op
   options.check();
   require_tissues(image);
   Reconstruction result;
-  LabelImage without_prongs = image;
-  const double prong_volume_mm3 = turn_prongs_into_muscle(without_prongs, options.thinnest_mm);
-  VoxelSurface breast = voxel_surface(without_prongs, meshed_tissues(), options.smallest_piece_mm3);
-  breast.surface.region = regions_of(breast, without_prongs, options.cut);
-  result.breast = finish("breast", breast, without_prongs, options);
-  result.breast.prong_volume_mm3 = prong_volume_mm3;
+  LabelImage without_perforators = image;
+  const double perforator_volume_mm3 = turn_perforators_into_muscle(without_perforators, options.thinnest_mm);
+  VoxelSurface breast = voxel_surface(without_perforators, meshed_tissues(), options.smallest_piece_mm3);
+  breast.surface.region = regions_of(breast, without_perforators, options.cut);
+  result.breast = finish("breast", breast, without_perforators, options);
+  result.breast.perforator_volume_mm3 = perforator_volume_mm3;
   result.muscle = reversed_region(result.breast.surface, Region::inner);
   if (result.muscle.triangles.rows() == 0)
     throw InputError("no tissue to be meshed borders on the muscle; check the labels of muscle and of what lies on it");

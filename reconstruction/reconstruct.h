@@ -16,7 +16,7 @@ struct ReconstructOptions {
   std::optional<double> smooth_mm;
   /// Loose bits of meshed tissue below this are left out of the breast: a solver cannot hold them.
   double smallest_piece_mm3 = 100;
-  /// Prongs of tissue inside the muscle that are thinner than this count as muscle.
+  /// Perforators (strands of tissue inside the muscle) that are thinner than this count as muscle.
   double thinnest_mm = 3;
   /// An organ that would have more triangles is made from blocks of voxels; >= 1000.
   int most_organ_triangles = 300000;
@@ -33,7 +33,7 @@ struct OrganSurface {
   int voxel_components = 0;     ///< pieces of those voxels, joined through faces
   int dropped_pieces = 0;       ///< left out for their size (breast only)
   double dropped_volume_mm3 = 0;
-  double prong_volume_mm3 = 0;         ///< counted as muscle (breast only)
+  double perforator_volume_mm3 = 0;    ///< counted as muscle (breast only)
   double voxel_mm = 0;                 ///< largest side of the voxels the surface was made from
   std::size_t self_intersections = 0;  ///< counted on the surface; 0
   Eigen::Index less_smooth_points =

@@ -26,7 +26,7 @@ struct DistanceSamples {
   Eigen::VectorXd weight;  ///< mm², area times the weight of the offset
 };
 
-/// φ = 0 on the samples and φ = d at p + d n for a fan of offsets d, where no other sample is nearer than p.
+/// φ = 0 on the samples and φ = d at p + d n for ten offsets d, where no other sample is nearer than p.
 /// @param highest_mm  largest offset on the breast's side
 DistanceSamples offset_samples(const SheetSamples& sheet, double highest_mm);
 

@@ -30,22 +30,23 @@ Face face_of(const Tet& tet, int opposite) {
   return {tet[f[0]], tet[f[1]], tet[f[2]]};
 }
 
-/// A set of tetrahedra to be replaced by a fan around one point.
+/// A set of tetrahedra to be replaced by the star of one point: a tetrahedron from it to each face of the shell.
 struct Cavity {
   std::vector<int> cells;
   std::vector<Face> shell;  // faces of one of the cells only
   double worst_deg = 180;   // of the cells as they are
 };
 
-struct Fan {
+struct Star {
   Cavity cavity;
   Point centre;
   double worst_deg;
 };
 
-class Workshop {
+/// Points are added where the star of the best one is better shaped than the cavity it fills.
+class PointInsertion {
  public:
-  Workshop(const TetMesh& mesh, const Triangles& walls) : points_(mesh.points.rows()), tets_(mesh.cells.rows()) {
+  PointInsertion(const TetMesh& mesh, const Triangles& walls) : points_(mesh.points.rows()), tets_(mesh.cells.rows()) {
     for (Eigen::Index t = 0; t < walls.rows(); ++t) walls_.insert(sorted({walls(t, 0), walls(t, 1), walls(t, 2)}));
     for (Eigen::Index p = 0; p < mesh.points.rows(); ++p) points_[p] = mesh.points.row(p);
     for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
@@ -66,12 +67,12 @@ class Workshop {
     std::vector<Tet> added;
     int count = 0;
     for (const auto& [shape, cell] : bad) {
-      const std::optional<Fan> fan = best_fan(cell, used);
-      if (!fan) continue;
-      for (const int c : fan->cavity.cells) used[c] = 1;
+      const std::optional<Star> star = best_star(cell, used);
+      if (!star) continue;
+      for (const int c : star->cavity.cells) used[c] = 1;
       const int centre = static_cast<int>(points_.size());
-      points_.push_back(fan->centre);
-      for (const Face& f : fan->cavity.shell) added.push_back({f[0], f[2], f[1], centre});
+      points_.push_back(star->centre);
+      for (const Face& f : star->cavity.shell) added.push_back({f[0], f[2], f[1], centre});
       ++count;
     }
     std::vector<Tet> kept;
@@ -173,7 +174,7 @@ class Workshop {
   }
 
   // Pattern search for the centre from which the worst tetrahedron to the shell is best.
-  Fan fan_of(const Cavity& cavity) const {
+  Star star_of(const Cavity& cavity) const {
     Point centre = Point::Zero();
     double reach = 0;
     for (const Face& f : cavity.shell) {
@@ -203,15 +204,15 @@ class Workshop {
     return {cavity, centre, best};
   }
 
-  std::optional<Fan> best_fan(int cell, const std::vector<char>& used) const {
+  std::optional<Star> best_star(int cell, const std::vector<char>& used) const {
     if (used[cell]) return std::nullopt;
-    std::optional<Fan> best;
+    std::optional<Star> best;
     for (const std::set<int>& cells : candidates(cell)) {
       const std::optional<Cavity> cavity = cavity_of(cells, used);
       if (!cavity) continue;
-      Fan fan = fan_of(*cavity);
-      if (fan.worst_deg > cavity->worst_deg + least_gain_deg && (!best || fan.worst_deg > best->worst_deg))
-        best = std::move(fan);
+      Star star = star_of(*cavity);
+      if (star.worst_deg > cavity->worst_deg + least_gain_deg && (!best || star.worst_deg > best->worst_deg))
+        best = std::move(star);
     }
     return best;
   }
@@ -225,15 +226,15 @@ class Workshop {
 }  // namespace
 
 int insert_points(TetMesh& mesh, double wanted_deg, const Triangles& walls) {
-  Workshop workshop(mesh, walls);
+  PointInsertion insertion(mesh, walls);
   int added = 0;
   for (int round = 0; round < rounds; ++round) {
-    const int now = workshop.pass(wanted_deg);
+    const int now = insertion.pass(wanted_deg);
     added += now;
     if (now == 0) break;
   }
   if (added == 0) return 0;
-  workshop.store(mesh);
+  insertion.store(mesh);
   set_face_cells(mesh);
   return added;
 }

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "common/suggestion.h"
 #include "common/toml_reader.h"
 #include "pipeline/case/case_image.h"
 
@@ -25,10 +26,9 @@ const std::vector<std::string> reserved_names = {
     "scan",       "calibration", "model",  "history", "ladder", "diagnosis", "sensitivity", "report"};
 
 Eigen::Vector3d read_gravity(const TomlReader& pose, const std::string& frame) {
-  const auto g = pose.numbers("gravity");
-  if (!g) pose.fail("gravity", "is missing: give the direction in which things fall, as three numbers of length 1");
-  if (g->size() != 3) pose.fail("gravity", fmt::format("must be three numbers, not {}", g->size()));
-  const Eigen::Vector3d vector(g->at(0), g->at(1), g->at(2));
+  const auto given = pose.vector("gravity");
+  if (!given) pose.fail("gravity", "is missing: give the direction in which things fall, as three numbers of length 1");
+  const Eigen::Vector3d vector = *given;
   const double length = vector.norm();
   if (length == 0) pose.fail("gravity", "is zero; give the direction in which things fall, of length 1");
   if (std::abs(length - 1) > unit_tolerance) {

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "segmentation/recipe.h"
+#include "segmentation/steps/recipe.h"
 #include "segmentation/tissue.h"
 
 namespace supine::pipeline {

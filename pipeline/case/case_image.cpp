@@ -5,8 +5,9 @@
 
 #include <algorithm>
 
+#include "common/suggestion.h"
 #include "pipeline/case/patient_frame.h"
-#include "segmentation/recipe_toml.h"
+#include "segmentation/steps/recipe_toml.h"
 
 namespace supine::pipeline {
 namespace {
@@ -98,7 +99,7 @@ void read_case_image(const TomlReader& file, Case& result) {
   if (!recipe) return;
   if (needs_labels)
     file.fail("segmentation", "is read only when [image] kind = \"mri\"; take the table out, or change kind");
-  result.recipe = segmentation::read_recipe(recipe->table(), file.file().string() + " [segmentation]", result.frame);
+  result.recipe = segmentation::read_recipe(*recipe, result.frame);
 }
 
 }  // namespace supine::pipeline

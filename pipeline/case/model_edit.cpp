@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "common/suggestion.h"
 #include "common/toml_reader.h"
 
 namespace supine::pipeline {

@@ -3,10 +3,10 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <set>
 
 #include "common/error.h"
+#include "common/suggestion.h"
 #include "common/toml_reader.h"
 #include "simulation/catalogue.h"
 #include "simulation/laws/bulk_laws.h"
@@ -71,11 +71,7 @@ void read_setting(const TomlReader& section, const std::string& key, const Param
 template <class Choice>
 void read_choice(const std::optional<TomlReader>& section, std::string_view key,
                  const std::vector<std::pair<std::string, Choice>>& values, Choice& choice) {
-  if (!section || !section->has(key)) return;
-  std::vector<std::string> names;
-  for (const auto& [name, value] : values) names.push_back(name);
-  const std::string chosen = section->choice(key, names, "");
-  choice = std::find_if(values.begin(), values.end(), [&](const auto& v) { return v.first == chosen; })->second;
+  if (section) choice = section->choice<Choice>(key, values).value_or(choice);
 }
 
 void read_choices(const TomlReader& file, Model& model) {

@@ -47,8 +47,9 @@ class ReconstructTool : public Tool {
     app.add_option("--rim-mm", rim_mm_, "how far from the muscle bare tissue counts as its rim, mm, > 0");
     app.add_option("--smallest-piece-mm3", options_.smallest_piece_mm3,
                    "loose bits of tissue below this volume are left out, mm3, >= 0");
-    app.add_option("--thinnest-mm", options_.thinnest_mm,
-                   "prongs of tissue thinner than this that lie inside the muscle are counted as muscle, mm, >= 0");
+    app.add_option(
+        "--thinnest-mm", options_.thinnest_mm,
+        "perforators (strands of tissue inside the muscle) thinner than this are counted as muscle, mm, >= 0");
   }
 
   Outcome run(Run& run) override {
@@ -128,7 +129,7 @@ class ReconstructTool : public Tool {
     json["cavities"] = report.cavities;
     json["dropped_pieces"] = organ.dropped_pieces;
     json["dropped_ml"] = organ.dropped_volume_mm3 / 1000;
-    json["prongs_in_muscle_ml"] = organ.prong_volume_mm3 / 1000;
+    json["prongs_in_muscle_ml"] = organ.perforator_volume_mm3 / 1000;
     json["euler"] = report.euler;
     json["genus"] = report.genus();
     json["closed"] = report.closed();
@@ -153,9 +154,9 @@ class ReconstructTool : public Tool {
     if (made.breast.dropped_pieces > 0)
       run.warn(fmt::format("{} loose bits of tissue were left out, {:.2f} ml together", made.breast.dropped_pieces,
                            made.breast.dropped_volume_mm3 / 1000));
-    if (made.breast.prong_volume_mm3 > 0)
+    if (made.breast.perforator_volume_mm3 > 0)
       run.warn(fmt::format("{:.2f} ml of thin tissue inside the muscle were counted as muscle",
-                           made.breast.prong_volume_mm3 / 1000));
+                           made.breast.perforator_volume_mm3 / 1000));
     if (made.breast.report.cavities > 0)
       run.warn(fmt::format("the breast encloses {} cavities of air, muscle or excluded tissue",
                            made.breast.report.cavities));

@@ -18,8 +18,8 @@
 #include "segmentation/formats/labels_io.h"
 #include "segmentation/label_map.h"
 #include "segmentation/overlay.h"
-#include "segmentation/recipe_toml.h"
-#include "segmentation/run_recipe.h"
+#include "segmentation/steps/recipe_toml.h"
+#include "segmentation/steps/run_recipe.h"
 
 namespace supine::pipeline {
 namespace {

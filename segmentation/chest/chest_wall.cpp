@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "common/error.h"
-#include "segmentation/chest/fan.h"
+#include "segmentation/chest/boundary_cost.h"
 #include "segmentation/chest/sampler.h"
 
 namespace supine::segmentation {
@@ -17,16 +17,17 @@ namespace {
 constexpr double farthest_mm = 220;        // from the centre that the wall may lie
 constexpr double widest_angle_rad = 1.83;  // 105 degrees to either side
 constexpr double one_degree = std::numbers::pi / 180;
-constexpr double oval_reach_mm = 25;
-constexpr double oval_blur_mm = 4;        // either side of an oval that counts for it
-constexpr double coupling_reach_mm = 20;  // a neighbour farther off pulls no harder
+constexpr double superellipse_reach_mm = 25;  // a place farther from it is pulled no harder
+constexpr double superellipse_blur_mm = 4;    // to either side of the superellipse that counts for it
+constexpr double coupling_reach_mm = 20;      // a neighbour farther off pulls no harder
 constexpr int most_sweeps = 12;
-// Lines are seen best along their own course: the fan is bent to what is known of it and averaged over neighbours.
-struct Bending {
-  double reach_mm;
+// Lines are seen best along their own course: the rays start from what is known of it and are averaged over
+// their neighbours.
+struct Look {
+  double reach_mm;     // to either side of what is known
   int angles, levels;  // averaged to either side
 };
-constexpr Bending first_look{0, 1, 1}, bendings[] = {{30, 3, 2}, {10, 4, 3}};
+constexpr Look first_look{0, 1, 1}, closer_looks[] = {{30, 3, 2}, {10, 4, 3}};
 
 using Chains = std::vector<std::vector<int>>;
 
@@ -46,21 +47,23 @@ void spread(std::vector<double>& value, std::vector<int>& from, double slope) {
     }
 }
 
-/// The search for the cheapest surface in one fan.
+/// The search for the cheapest surface over the samples of the rays.
 class Search {
  public:
-  Search(const Fan& fan, const std::vector<float>& prices, const ChestWall& wall, const ChestWallOptions& options)
-      : fan_(fan), prices_(prices), options_(options) {
-    oval_.resize(fan.angles(), fan.levels());
-    for (Eigen::Index k = 0; k < fan.levels(); ++k)
-      for (Eigen::Index a = 0; a < fan.angles(); ++a)
-        oval_(a, k) = (wall.oval.radius_mm(wall.angle(a), wall.z(k)) - fan.radius_mm(a, k, 0)) / Fan::step_mm;
+  Search(const RayProfiles& profiles, const std::vector<float>& costs, const ChestWall& wall,
+         const ChestWallOptions& options)
+      : profiles_(profiles), costs_(costs), options_(options) {
+    superellipse_.resize(profiles.angles(), profiles.levels());
+    for (Eigen::Index k = 0; k < profiles.levels(); ++k)
+      for (Eigen::Index a = 0; a < profiles.angles(); ++a)
+        superellipse_(a, k) = (wall.superellipse.radius_mm(wall.angle(a), wall.z(k)) - profiles.radius_mm(a, k, 0)) /
+                              RayProfiles::step_mm;
   }
 
   /// Sweeps over the levels until no chain changes.
   Chains settle() const {
     Chains chains;
-    const auto n = static_cast<int>(fan_.levels());
+    const auto n = static_cast<int>(profiles_.levels());
     for (int k = 0; k < n; ++k) chains.push_back(cheapest(k, {}));
     for (int sweep = 0; sweep < most_sweeps; ++sweep) {
       bool changed = false;
@@ -79,25 +82,25 @@ class Search {
   }
 
  private:
-  /// Price of a sample with the pulls of the oval and of the neighbouring levels.
-  double price(Eigen::Index a, int k, int i, const std::vector<const std::vector<int>*>& neighbours) const {
-    constexpr double step = Fan::step_mm;
-    double sum = prices_[fan_.ray(a, k) * fan_.count + i] +
-                 options_.oval_pull_per_mm * std::min(oval_reach_mm, step * std::abs(i - oval_(a, k)));
+  /// Cost of a sample with the pulls of the superellipse and of the neighbouring levels.
+  double cost(Eigen::Index a, int k, int i, const std::vector<const std::vector<int>*>& neighbours) const {
+    constexpr double step = RayProfiles::step_mm;
+    double sum = costs_[profiles_.ray(a, k) * profiles_.count + i] +
+                 options_.oval_pull_per_mm * std::min(superellipse_reach_mm, step * std::abs(i - superellipse_(a, k)));
     for (const auto* other : neighbours)
       sum += options_.coupling_per_mm * std::min(coupling_reach_mm, step * std::abs(i - (*other)[a]));
     return sum;
   }
   /// The cheapest chain of samples over the rays of a level.
   std::vector<int> cheapest(int k, const std::vector<const std::vector<int>*>& neighbours) const {
-    const auto angles = static_cast<std::size_t>(fan_.angles());
-    const int n = fan_.count;
+    const auto angles = static_cast<std::size_t>(profiles_.angles());
+    const int n = profiles_.count;
     std::vector<std::vector<int>> from(angles, std::vector<int>(n));
     std::vector<double> value(n);
-    for (int i = 0; i < n; ++i) value[i] = price(0, k, i, neighbours);
+    for (int i = 0; i < n; ++i) value[i] = cost(0, k, i, neighbours);
     for (std::size_t a = 1; a < angles; ++a) {
-      spread(value, from[a], options_.stiffness_per_mm * Fan::step_mm);
-      for (int i = 0; i < n; ++i) value[i] += price(static_cast<Eigen::Index>(a), k, i, neighbours);
+      spread(value, from[a], options_.stiffness_per_mm * RayProfiles::step_mm);
+      for (int i = 0; i < n; ++i) value[i] += cost(static_cast<Eigen::Index>(a), k, i, neighbours);
     }
     std::vector<int> chain(angles);
     chain.back() = static_cast<int>(std::min_element(value.begin(), value.end()) - value.begin());
@@ -105,37 +108,39 @@ class Search {
     return chain;
   }
 
-  const Fan& fan_;
-  const std::vector<float>& prices_;
+  const RayProfiles& profiles_;
+  const std::vector<float>& costs_;
   const ChestWallOptions& options_;
-  Eigen::ArrayXXd oval_;  // sample of the rough oval on each ray
+  Eigen::ArrayXXd superellipse_;  // sample of the superellipse on each ray
 };
 
-/// The oval whose border is cheapest, taken over a few millimetres to either side because no chest is an oval.
-Oval find_oval(const Fan& fan, const std::vector<float>& prices, const ChestWall& wall, double centre_depth_mm) {
-  const int blur = static_cast<int>(oval_blur_mm / Fan::step_mm), n = fan.count;
-  std::vector<float> near(prices.size());
+/// The superellipse whose border is cheapest, taken over a few millimetres to either side: no chest is one.
+Superellipse fit_superellipse(const RayProfiles& profiles, const std::vector<float>& costs, const ChestWall& wall,
+                              double centre_depth_mm) {
+  const int blur = static_cast<int>(superellipse_blur_mm / RayProfiles::step_mm), n = profiles.count;
+  std::vector<float> near(costs.size());
 #pragma omp parallel for schedule(static)
-  for (std::size_t ray = 0; ray < fan.end.size(); ++ray)
+  for (std::size_t ray = 0; ray < profiles.end.size(); ++ray)
     for (int i = 0; i < n; ++i) {
       double sum = 0, weight = 0;
       for (int j = std::max(0, i - blur); j <= std::min(n - 1, i + blur); ++j) {
         const double w = blur + 1 - std::abs(i - j);
-        sum += w * prices[ray * n + j];
+        sum += w * costs[ray * n + j];
         weight += w;
       }
       near[ray * n + i] = static_cast<float>(sum / weight);
     }
-  const auto price = [&](const Oval& oval) {
+  const auto cost = [&](const Superellipse& shape) {
     double sum = 0;  // every sixth ray is plenty for four numbers
-    for (Eigen::Index k = 0; k < fan.levels(); k += 2)
-      for (Eigen::Index a = 0; a < fan.angles(); a += 3) {
-        const double i = (oval.radius_mm(wall.angle(a), wall.z(k)) - fan.radius_mm(a, k, 0)) / Fan::step_mm;
-        sum += near[fan.ray(a, k) * n + std::clamp(static_cast<int>(std::lround(i)), 0, n - 1)];
+    for (Eigen::Index k = 0; k < profiles.levels(); k += 2)
+      for (Eigen::Index a = 0; a < profiles.angles(); a += 3) {
+        const double i =
+            (shape.radius_mm(wall.angle(a), wall.z(k)) - profiles.radius_mm(a, k, 0)) / RayProfiles::step_mm;
+        sum += near[profiles.ray(a, k) * n + std::clamp(static_cast<int>(std::lround(i)), 0, n - 1)];
       }
     return sum;
   };
-  return best_oval(price, centre_depth_mm, wall.z(fan.levels() / 2));
+  return best_superellipse(cost, centre_depth_mm, wall.z(profiles.levels() / 2));
 }
 
 /// The radius nearest to `radius` at which the grey rises through the half-way level; `radius` when there is none.
@@ -159,16 +164,17 @@ double half_way(const GreyImage& image, const ChestWallOptions& options, const E
   return best;
 }
 
-/// Takes the border of the fan over to the wall.
-void settle(const Fan& fan, const std::vector<float>& prices, const ChestWallOptions& options, ChestWall& wall) {
-  const Chains chains = Search(fan, prices, wall, options).settle();
-  wall.radius_mm.resize(fan.angles(), fan.levels());
-  wall.price.resize(fan.angles(), fan.levels());
-  for (Eigen::Index k = 0; k < fan.levels(); ++k)
-    for (Eigen::Index a = 0; a < fan.angles(); ++a) {
+/// Takes the cheapest border over to the wall.
+void settle(const RayProfiles& profiles, const std::vector<float>& costs, const ChestWallOptions& options,
+            ChestWall& wall) {
+  const Chains chains = Search(profiles, costs, wall, options).settle();
+  wall.radius_mm.resize(profiles.angles(), profiles.levels());
+  wall.cost.resize(profiles.angles(), profiles.levels());
+  for (Eigen::Index k = 0; k < profiles.levels(); ++k)
+    for (Eigen::Index a = 0; a < profiles.angles(); ++a) {
       const int i = chains[k][a];
-      wall.price(a, k) = fan.seen(a, k) ? prices[fan.ray(a, k) * fan.count + i] : NAN;
-      wall.radius_mm(a, k) = fan.radius_mm(a, k, i);
+      wall.cost(a, k) = profiles.seen(a, k) ? costs[profiles.ray(a, k) * profiles.count + i] : NAN;
+      wall.radius_mm(a, k) = profiles.radius_mm(a, k, i);
     }
 }
 
@@ -221,23 +227,25 @@ ChestWall find_chest_wall(const GreyImage& image, const Mask& body, const Torso&
   wall.first_angle_rad = -static_cast<double>(half) * one_degree;
   wall.step_angle_rad = one_degree;
   const bool lines = options.border == ChestWallOptions::Border::line;
-  Fan fan = sample_fan(image, body, wall, Eigen::ArrayXXd::Zero(2 * half + 1, front.y_mm.cols()), 0, farthest_mm);
-  if (lines) blur_fan(fan, first_look.angles, first_look.levels);
-  std::vector<float> prices = price_fan(fan, options);
-  wall.oval = find_oval(fan, prices, wall, options.centre_depth_mm);
-  settle(fan, prices, options, wall);
+  RayProfiles profiles =
+      sample_rays(image, body, wall, Eigen::ArrayXXd::Zero(2 * half + 1, front.y_mm.cols()), 0, farthest_mm);
+  if (lines) blur_profiles(profiles, first_look.angles, first_look.levels);
+  std::vector<float> costs = boundary_costs(profiles, options);
+  wall.superellipse = fit_superellipse(profiles, costs, wall, options.centre_depth_mm);
+  settle(profiles, costs, options, wall);
   if (!lines) {
     refine(image, options, wall);
     return wall;
   }
-  for (Eigen::Index k = 0; k < fan.levels(); ++k)  // what the first look saw is too noisy: start from the oval
-    for (Eigen::Index a = 0; a < fan.angles(); ++a)
-      wall.radius_mm(a, k) = wall.oval.radius_mm(wall.angle(a), wall.z(k));
-  for (const Bending& bending : bendings) {
-    fan = sample_fan(image, body, wall, wall.radius_mm, -bending.reach_mm, bending.reach_mm);
-    blur_fan(fan, bending.angles, bending.levels);
-    prices = price_fan(fan, options);
-    settle(fan, prices, options, wall);
+  // What the first look saw is too noisy: start from the superellipse.
+  for (Eigen::Index k = 0; k < profiles.levels(); ++k)
+    for (Eigen::Index a = 0; a < profiles.angles(); ++a)
+      wall.radius_mm(a, k) = wall.superellipse.radius_mm(wall.angle(a), wall.z(k));
+  for (const Look& look : closer_looks) {
+    profiles = sample_rays(image, body, wall, wall.radius_mm, -look.reach_mm, look.reach_mm);
+    blur_profiles(profiles, look.angles, look.levels);
+    costs = boundary_costs(profiles, options);
+    settle(profiles, costs, options, wall);
   }
   return wall;
 }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "segmentation/chest/oval.h"
+#include "segmentation/chest/superellipse.h"
 #include "segmentation/chest/torso.h"
 #include "segmentation/masks.h"
 
@@ -16,15 +16,14 @@ struct ChestWallOptions {
   /// step: the border parts dark muscle from bright fat (T1). line: fat and muscle may be equally bright, and a thin
   /// dark line (fascia, chemical shift) runs between them (fat-suppressed).
   enum class Border { step, line } border = Border::step;
-  float dark = 40;              ///< greys up to here are surely muscle or chest
-  float bright = 65;            ///< greys from here on are surely fat; > dark
-  double band_mm = 6;           ///< depth on either side of the border that must be dark and bright; > 0
-  double centre_depth_mm = 90;  ///< of the rays' centre behind the skin over the sternum; > 0
-  double stiffness_per_mm =
-      0.03;  ///< price of a step of the border between neighbouring rays (1 = a wholly wrong band)
-  double coupling_per_mm = 0.012;   ///< price of a step between neighbouring levels
-  double far_weight = 0.4;          ///< price of 10 mm of dark tissue farther out: the border is the outermost
-  double oval_pull_per_mm = 0.005;  ///< price of a distance from the rough oval of the chest, as far as 25 mm; >= 0
+  float dark = 40;                 ///< greys up to here are surely muscle or chest
+  float bright = 65;               ///< greys from here on are surely fat; > dark
+  double band_mm = 6;              ///< depth on either side of the border that must be dark and bright; > 0
+  double centre_depth_mm = 90;     ///< of the rays' centre behind the skin over the sternum; > 0
+  double stiffness_per_mm = 0.03;  ///< cost of a step of the border between neighbouring rays (1 = a wholly wrong band)
+  double coupling_per_mm = 0.012;  ///< cost of a step between neighbouring levels
+  double far_weight = 0.4;         ///< cost of 10 mm of dark tissue farther out: the border is the outermost
+  double oval_pull_per_mm = 0.005;  ///< cost of a distance from the superellipse, as far as 25 mm; >= 0
   double refine_mm = 3;             ///< at most this far the border then moves to the half-way grey
 };
 
@@ -32,13 +31,13 @@ struct ChestWallOptions {
 /// from straight forward, and the wall is at one radius on each.
 struct ChestWall {
   Torso torso;
-  Oval oval;  ///< the rough shape that was found first
+  Superellipse superellipse;  ///< the rough shape that was found first
   double centre_y_mm = 0;
   double z0_mm = 0, step_z_mm = 1;
   double first_angle_rad = 0, step_angle_rad = 0;                    ///< 0 = to the front, > 0 = to the patient's left
   ChestWallOptions::Border border = ChestWallOptions::Border::step;  ///< how it was looked for
   Eigen::ArrayXXd radius_mm;                                         ///< angles by levels
-  Eigen::ArrayXXd price;  ///< of the data there, 0 (clear border) to about 2; NaN where no data decided
+  Eigen::ArrayXXd cost;  ///< of the data there, 0 (clear border) to about 2; NaN where no data decided
 
   double angle(Eigen::Index a) const { return first_angle_rad + static_cast<double>(a) * step_angle_rad; }
   double z(Eigen::Index k) const { return z0_mm + static_cast<double>(k) * step_z_mm; }

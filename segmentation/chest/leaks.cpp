@@ -29,7 +29,7 @@ std::vector<Leak> find_leaks(const ChestWall& wall, double back_y_mm, double lea
   for (Eigen::Index k = 0; k < levels; ++k)
     for (Eigen::Index a = 0; a < angles; ++a)
       mask[static_cast<std::size_t>(k * angles + a)] =
-          wall.price(a, k) > unclear && wall.point(a, k).y() < back_y_mm;  // NaN is not
+          wall.cost(a, k) > unclear && wall.point(a, k).y() < back_y_mm;  // NaN is not
   const Components patches = connected_components(mask, grid);
   std::vector<Leak> leaks(patches.size.size(), Leak{Eigen::Vector3d::Zero(), 0, 0});
   std::vector<Eigen::Vector3d> low(leaks.size(), Eigen::Vector3d::Constant(INFINITY)),

@@ -15,7 +15,7 @@ struct Leak {
   double size_mm = 0;  ///< of its bounding box, along the longest side
 };
 
-/// Patches of the wall, in front of @p back_y_mm, whose price says that most of what a border shows is missing;
+/// Patches of the wall, in front of @p back_y_mm, whose cost says that most of what a border shows is missing;
 /// largest first.
 /// @param least_cm2  smaller patches are noise
 std::vector<Leak> find_leaks(const ChestWall& wall, double back_y_mm, double least_cm2 = 5);

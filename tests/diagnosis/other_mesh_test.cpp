@@ -16,7 +16,7 @@ namespace {
 
 using meshing::TetMesh;
 
-TetMesh bent_dome() {
+TetMesh curved_dome() {
   TetMesh mesh = meshing::to_quadratic(testing::dome_mesh({.rings = 8}));
   meshing::curve_boundary(mesh, testing::dome_surface({.rings = 40}), nullptr);
   return mesh;
@@ -32,21 +32,21 @@ double volume_mm3(const TetMesh& mesh) {
 
 double skin_edge_of(const TetMesh& mesh) { return meshing::skin_edge_mm(testing::boundary_surface(mesh)); }
 
-TEST(OtherMesh, OfBentCellsIsBentOntoTheirFaces) {
-  const TetMesh mesh = bent_dome();
+TEST(OtherMesh, OfCurvedCellsIsCurvedOntoTheirFaces) {
+  const TetMesh mesh = curved_dome();
   const meshing::Anatomy anatomy = meshing::compute_anatomy(mesh, "left");
-  const double bent = volume_mm3(mesh);
+  const double curved = volume_mm3(mesh);
   TetMesh flat = mesh;  // what straight edges between the same corners would leave out
   for (Eigen::Index c = 0; c < flat.cells.rows(); ++c)
     for (int e = 0; e < 6; ++e)
       flat.points.row(flat.cells(c, 4 + e)) = (flat.points.row(flat.cells(c, meshing::tet_edges[e][0])) +
                                                flat.points.row(flat.cells(c, meshing::tet_edges[e][1]))) /
                                               2;
-  const double missed = bent - volume_mm3(flat);
-  ASSERT_GT(missed, 1e-3 * bent);
+  const double missed = curved - volume_mm3(flat);
+  ASSERT_GT(missed, 1e-3 * curved);
   for (const TetMesh& other : {other_mesh(mesh, anatomy, 0.5), coarser_mesh(mesh, anatomy, 0.8)}) {
     EXPECT_EQ(other.order(), 2);
-    EXPECT_LT(std::abs(volume_mm3(other) - bent), missed / 4);
+    EXPECT_LT(std::abs(volume_mm3(other) - curved), missed / 4);
   }
 }
 

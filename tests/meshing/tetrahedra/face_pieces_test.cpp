@@ -17,7 +17,7 @@ namespace {
 
 using meshing::TetMesh;
 
-TetMesh bent_dome() {
+TetMesh curved_dome() {
   TetMesh mesh = meshing::to_quadratic(testing::dome_mesh({.rings = 6}));
   meshing::curve_boundary(mesh, testing::dome_surface({.rings = 40}), nullptr);
   return mesh;
@@ -30,8 +30,8 @@ double volume_mm3(const TetMesh& mesh) {
   return sum;
 }
 
-TEST(FacePieces, AreAClosedSurfaceOnTheBentFaces) {
-  const TetMesh mesh = bent_dome();
+TEST(FacePieces, AreAClosedSurfaceOnTheCurvedFaces) {
+  const TetMesh mesh = curved_dome();
   const reconstruction::Surface surface = meshing::face_pieces(mesh);
   const auto report = reconstruction::check_surface(surface);
   EXPECT_EQ(report.triangles, 16 * mesh.faces.rows());
@@ -39,13 +39,13 @@ TEST(FacePieces, AreAClosedSurfaceOnTheBentFaces) {
   EXPECT_EQ(report.euler, 2);
   // Flat pieces cut off a sixteenth of what flat faces do.
   const double flat = reconstruction::check_surface(testing::boundary_surface(mesh)).volume_mm3;
-  const double bent = volume_mm3(mesh);
-  ASSERT_GT(std::abs(bent - flat), 1e-3 * bent);
-  EXPECT_NEAR((bent - report.volume_mm3) / (bent - flat), 1.0 / 16, 0.01);
+  const double curved = volume_mm3(mesh);
+  ASSERT_GT(std::abs(curved - flat), 1e-3 * curved);
+  EXPECT_NEAR((curved - report.volume_mm3) / (curved - flat), 1.0 / 16, 0.01);
 }
 
 TEST(FacePieces, KeepTheRegionsOfTheirFaces) {
-  const TetMesh mesh = bent_dome();
+  const TetMesh mesh = curved_dome();
   const reconstruction::Surface surface = meshing::face_pieces(mesh);
   const auto report = reconstruction::check_surface(surface);
   double area_mm2[report.region_area_mm2.size()] = {};

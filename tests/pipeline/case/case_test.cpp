@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/case/case.h"
 
+#include <fmt/core.h>
+
+#include <algorithm>
 #include <vector>
 
 #include "tests/pipeline/temporary_folder.h"
@@ -209,6 +212,14 @@ TEST_F(CaseFile, AFolderWithoutCaseFileIsNamed) {
 
 TEST_F(CaseFile, AFileInsteadOfAFolderIsNamed) {
   expect_words(input_error([&] { read_case(folder_ / "labels.nrrd"); }), {"labels.nrrd", "not a folder"});
+}
+
+TEST_F(CaseFile, AComplaintAboutTheRecipeNamesCaseTomlAndTheLine) {
+  const std::string recipe = "[[segmentation.step]]\ndo = \"islads\"\n[landmarks]";
+  const std::string text = replaced(replaced(good, "kind = \"labels\"", "kind = \"mri\""), "[landmarks]", recipe);
+  const auto line = 2 + std::count(text.begin(), text.begin() + static_cast<long>(text.find(recipe)), '\n');
+  expect_words(input_error([&] { read(text); }),
+               {fmt::format("case.toml:{}: [segmentation.step 1] do", line), "\"islads\"", "did you mean islands?"});
 }
 
 TEST_F(CaseFile, AnUnknownPoseListsThoseThereAre) {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "segmentation/recipe_toml.h"
-#include "segmentation/run_recipe.h"
+#include "segmentation/steps/recipe_toml.h"
+#include "segmentation/steps/run_recipe.h"
 #include "tests/segmentation/formats/image_files.h"
 
 // The steps otsu and march of a recipe: read, run, refused.
@@ -14,7 +14,10 @@ namespace {
 
 using testing::message_of;
 
-Recipe read(const std::string& steps) { return read_recipe(toml::parse(steps), "case.toml [segmentation]", "LPS"); }
+Recipe read(const std::string& steps) {
+  const toml::table table = toml::parse(steps);
+  return read_recipe(TomlReader(table, "case.toml", "segmentation"));
+}
 
 GreyImage row(const std::vector<float>& greys) {
   GreyImage image;
@@ -51,9 +54,9 @@ TEST(OtsuStep, RefusesClassesThatAreNotThere) {
   const auto refusal = [](const std::string& keys) {
     return message_of([&] { read("[[step]]\ndo = \"otsu\"\nmask = \"m\"\n" + keys); });
   };
-  EXPECT_NE(refusal("classes = 9").find("classes: 9 is out of range"), std::string::npos);
-  EXPECT_NE(refusal("classes = 3\nfirst = 4").find("first: 4 is out of range"), std::string::npos);
-  EXPECT_NE(refusal("classes = 3\nfirst = 3\nlast = 2").find("last: 2 is out of range"), std::string::npos);
+  EXPECT_NE(refusal("classes = 9").find("classes = 9: must be >= 2 and <= 8"), std::string::npos);
+  EXPECT_NE(refusal("classes = 3\nfirst = 4").find("first = 4: must be >= 1 and <= 3"), std::string::npos);
+  EXPECT_NE(refusal("classes = 3\nfirst = 3\nlast = 2").find("last = 2: must be >= 3 and <= 3"), std::string::npos);
   EXPECT_NE(message_of([] {
               mask_of(row({7, 7, 8, 8}), "[[step]]\ndo = \"otsu\"\nmask = \"m\"\nclasses = 3");
             }).find("step 1 (otsu)"),
@@ -92,10 +95,10 @@ TEST(MarchStep, RefusesAStartInAirAndMissingNumbers) {
   EXPECT_NE(in_air.find("the speed at source (2.0, 0.0, 0.0) mm is 0"), std::string::npos) << in_air;
   const std::string outside = message_of([&] { mask_of(image, step + "stop_mm = 5\nseeds_mm = [[9, 0, 0]]"); });
   EXPECT_NE(outside.find("outside the image"), std::string::npos) << outside;
-  EXPECT_NE(message_of([&] { read(step + "seeds_mm = [[0, 0, 0]]"); }).find("stop_mm: missing"), std::string::npos);
+  EXPECT_NE(message_of([&] { read(step + "seeds_mm = [[0, 0, 0]]"); }).find("stop_mm: is missing"), std::string::npos);
   EXPECT_NE(message_of([&] {
               read("[[step]]\ndo = \"march\"\nmask = \"m\"\nspeed = \"gradient\"\nseeds_mm = [[0, 0, 0]]\nstop_mm = 5");
-            }).find("half_per_mm: missing"),
+            }).find("half_per_mm: is missing"),
             std::string::npos);
 }
 

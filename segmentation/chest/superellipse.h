@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <functional>
+
+namespace supine::segmentation {
+
+/// The rough cross-section of a chest as a superellipse (Lamé curve): |x / half_width|^power + |y / depth|^power = 1
+/// about the rays' centre, the depth changing linearly with z.
+struct Superellipse {
+  double half_width_mm = 140;
+  double depth_mm = 72;    ///< at z = middle_z_mm
+  double depth_slope = 0;  ///< d depth / dz
+  double power = 2.5;
+  double middle_z_mm = 0;
+
+  double radius_mm(double angle_rad, double z_mm) const;
+};
+
+/// Tries the superellipses a chest may have (half width 100 to 175 mm, front 3 to 45 mm under the skin of the cleft,
+/// front tilted up to 22 degrees) and returns the one with the lowest sum of costs.
+/// @param cost  summed over the border for one of them
+/// @param centre_depth_mm  of the rays' centre behind the skin over the sternum
+Superellipse best_superellipse(const std::function<double(const Superellipse&)>& cost, double centre_depth_mm,
+                               double middle_z_mm);
+
+}  // namespace supine::segmentation

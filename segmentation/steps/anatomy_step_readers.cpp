@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <fmt/format.h>
+
+#include "segmentation/steps/step_readers.h"
+
+namespace supine::segmentation {
+namespace {
+
+Planes::Plane read_plane(const StepTable& table, const std::string& name, int axis) {
+  Planes::Plane plane;
+  plane.at_mm = table.coordinate(name + "_mm", axis);
+  plane.offset_mm = table.coordinate(name + "_offset_mm", axis).value_or(0);
+  if (plane.at_mm && plane.offset_mm != 0)
+    table.fail(name + "_offset_mm", fmt::format("has no effect beside {}_mm; leave one of them out", name));
+  return plane;
+}
+
+}  // namespace
+
+Step read_body(const StepTable& table) {
+  Body step;
+  step.mask = table.required_text("mask");
+  step.lower = table.grey("lower", 0, positive);
+  step.air = table.grey("air", 0, positive);
+  if (step.lower > 0 && step.air > step.lower)
+    table.fail("air", fmt::format("must not be above lower = {}", step.lower));
+  step.edge_share = table.grey("edge_share", 0, {.lower = 0, .upper = 0.9});
+  step.gap_mm = table.number("gap_mm", not_negative).value_or(step.gap_mm);
+  step.peel_mm = table.number("peel_mm", positive).value_or(step.peel_mm);
+  step.open_mm = table.number("open_mm", not_negative).value_or(step.open_mm);
+  return step;
+}
+
+Step read_chest(const StepTable& table) {
+  using Border = ChestWallOptions::Border;
+  Chest step;
+  step.mask = table.required_text("mask");
+  step.body = table.required_text("body");
+  step.sternum_mm = table.coordinate("sternum_mm", 0);
+  ChestWallOptions& o = step.options;
+  o.border = table.choice<Border>("border", {{"step", Border::step}, {"line", Border::line}}).value_or(o.border);
+  o.dark = table.grey("dark", o.dark);
+  o.bright = table.grey("bright", o.bright);
+  if (!(o.bright > o.dark)) table.fail("bright", fmt::format("must be above dark = {}", o.dark));
+  o.band_mm = table.number("band_mm", positive).value_or(o.band_mm);
+  o.centre_depth_mm = table.number("centre_depth_mm", positive).value_or(o.centre_depth_mm);
+  o.stiffness_per_mm = table.number("stiffness_per_mm", positive).value_or(o.stiffness_per_mm);
+  o.coupling_per_mm = table.number("coupling_per_mm", not_negative).value_or(o.coupling_per_mm);
+  o.far_weight = table.number("far_weight", not_negative).value_or(o.far_weight);
+  o.oval_pull_per_mm = table.number("oval_pull_per_mm", not_negative).value_or(o.oval_pull_per_mm);
+  o.refine_mm = table.number("refine_mm", not_negative).value_or(o.refine_mm);
+  return step;
+}
+
+Step read_planes(const StepTable& table) {
+  using Side = Planes::Side;
+  Planes step;
+  step.mask = table.required_text("mask");
+  step.body = table.required_text("body");
+  step.chest = table.required_text("chest");
+  step.left = table.mask_or_none("left");
+  step.right = table.mask_or_none("right");
+  step.sternum = read_plane(table, "sternum", 0);
+  step.mid_axillary = read_plane(table, "mid_axillary", 1);
+  step.inframammary = read_plane(table, "inframammary", 2);
+  step.superior = read_plane(table, "superior", 2);
+  step.side = table.choice<Side>("side", {{"both", Side::both}, {"left", Side::left}, {"right", Side::right}})
+                  .value_or(step.side);
+  return step;
+}
+
+}  // namespace supine::segmentation

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "segmentation/steps/body.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/error.h"
+#include "segmentation/steps/otsu.h"
+
+namespace supine::segmentation {
+namespace {
+
+constexpr double standing_out_mm = 1.5;
+
+/// The voxels of the face of the image that looks to the front (-y).
+std::vector<std::size_t> front_face(const Grid& grid) {
+  Eigen::Index axis = 0;
+  grid.direction.row(1).cwiseAbs().maxCoeff(&axis);
+  const int at = grid.direction(1, axis) > 0 ? 0 : grid.size[axis] - 1;
+  const int u = static_cast<int>(axis + 1) % 3, v = static_cast<int>(axis + 2) % 3;
+  std::vector<std::size_t> voxels;
+  Eigen::Vector3i n;
+  n[axis] = at;
+  for (n[v] = 0; n[v] < grid.size[v]; ++n[v])
+    for (n[u] = 0; n[u] < grid.size[u]; ++n[u]) voxels.push_back(grid.index(n.x(), n.y(), n.z()));
+  return voxels;
+}
+
+Mask complement(const Mask& mask) {
+  Mask result(mask.size());
+  for (std::size_t n = 0; n < mask.size(); ++n) result[n] = !mask[n];
+  return result;
+}
+
+/// Half the median grey of what is brighter than the air.
+float half_of_the_body(const GreyImage& image) {
+  const double air = otsu_levels(image.voxels, 4).front();
+  std::vector<float> greys;
+  for (const float grey : image.voxels)
+    if (grey >= air) greys.push_back(grey);
+  const auto middle = greys.begin() + static_cast<std::ptrdiff_t>(greys.size() / 2);
+  std::nth_element(greys.begin(), middle, greys.end());
+  return *middle / 2;
+}
+
+/// The largest grey within radius_mm along each axis in turn (a box, which serves as well as a ball).
+std::vector<float> local_maximum(const GreyImage& image, double radius_mm) {
+  std::vector<float> field = image.voxels, line;
+  const Grid& grid = image.grid;
+  const auto nx = static_cast<std::size_t>(grid.size.x());
+  const std::size_t strides[3] = {1, nx, nx * grid.size.y()};
+  for (int axis = 0; axis < 3; ++axis) {
+    const int n = grid.size[axis], reach = static_cast<int>(radius_mm / grid.spacing_mm[axis]);
+    const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+    line.resize(n);
+    for (int b = 0; b < grid.size[v]; ++b)
+      for (int a = 0; a < grid.size[u]; ++a) {
+        float* first = field.data() + a * strides[u] + b * strides[v];
+        for (int q = 0; q < n; ++q) line[q] = first[q * strides[axis]];
+        for (int q = 0; q < n; ++q)
+          first[q * strides[axis]] =
+              *std::max_element(line.begin() + std::max(0, q - reach), line.begin() + std::min(n - 1, q + reach) + 1);
+      }
+  }
+  return field;
+}
+
+/// Air in front: what is surely air, and from there what is dark within peel_mm of it.
+Mask find_air(const GreyImage& image, const Body& step, const Mask& dark) {
+  const Grid& grid = image.grid;
+  const float sure_level = step.air > 0 ? step.air : step.lower / 2;
+  Mask sure(dark.size());
+  for (std::size_t n = 0; n < sure.size(); ++n) sure[n] = dark[n] && image.voxels[n] < sure_level;
+  if (step.gap_mm > 0) sure = erode(sure, grid, step.gap_mm);
+  sure = flood(sure, grid, front_face(grid));
+  const std::vector<float> brightest = step.edge_share > 0 ? local_maximum(image, step.peel_mm) : std::vector<float>();
+  Mask near = dilate(sure, grid, step.gap_mm + step.peel_mm);
+  std::vector<std::size_t> from;
+  for (std::size_t n = 0; n < near.size(); ++n) {
+    near[n] = near[n] && (dark[n] || (!brightest.empty() && image.voxels[n] < step.edge_share * brightest[n]));
+    if (sure[n]) from.push_back(n);
+  }
+  return flood(near, grid, from);
+}
+
+}  // namespace
+
+Mask find_body(const GreyImage& image, const Body& wanted) {
+  const Grid& grid = image.grid;
+  Body step = wanted;
+  if (step.lower == 0) step.lower = half_of_the_body(image);
+  Mask dark(image.voxels.size());
+  for (std::size_t n = 0; n < dark.size(); ++n) dark[n] = image.voxels[n] < step.lower;
+  if (std::find(dark.begin(), dark.end(), 0) == dark.end())
+    throw InputError(
+        fmt::format("no grey reaches lower = {}; the volume holds no body, or the level is too high", step.lower));
+  Mask air = find_air(image, step, dark);
+  if (std::find(air.begin(), air.end(), 1) == air.end())
+    throw InputError(fmt::format("no air (greys below lower = {}) is found at the front of the image", step.lower));
+  Mask body = keep_islands(complement(air), grid, 1, 0);
+  if (step.open_mm > 0) {
+    // Only what stands out of the opened body goes: opening as such would round off the body's own corners.
+    const Mask opened = dilate(erode(body, grid, step.open_mm), grid, step.open_mm + standing_out_mm);
+    for (std::size_t n = 0; n < body.size(); ++n) body[n] = body[n] && opened[n];
+    body = keep_islands(body, grid, 1, 0);
+  }
+  return body;
+}
+
+}  // namespace supine::segmentation
