@@ -59,7 +59,7 @@ TEST_F(Make, RunsNothingAgainAndPrintsTheFigures) {
 }
 
 TEST_F(Make, PrintsTheBlockOfAStageThatIsUpToDateAgain) {
-  touch("supine.ply");
+  fs::remove(out() / "comparison.vtp");
   const Finished first = make({"compare"});
   expect_words(first.out, {"== compare supine", "MAE, scan to model"});
   const Finished second = make({"compare"});
