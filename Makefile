@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
 #   make demo                        install what is missing, build, take the sample from its MRI to the report
-#   make test                        the same set-up, then every test
+#   make test [DATA=dir]             the same set-up, then every test; DATA: docs/data.md
 #   make CASE=dir [OUT=dir] [stage]  run a case: segment reconstruct decimate mesh simulate compare, or as far as its data allow;
 #                                    then calibrate, diagnose, ladder; report: one page of what is there
 #   make style                       whether every source file is as clang-format 14 writes it; make format writes it
@@ -21,7 +21,8 @@ JOBS ?= $(shell awk -v cores=$$(nproc) '/^MemAvailable/ { m = int($$2 / 1572864)
 stages := segment reconstruct decimate mesh simulate compare calibrate diagnose ladder report summary
 run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 
-DATA ?= ../shared/data
+# Data that the repository does not hold: docs/data.md.
+DATA ?= data
 
 .PHONY: style format bench study hidden demo test build tools configure setup clean help case $(stages)
 
@@ -41,7 +42,7 @@ setup:
 	@pipeline/setup.sh
 
 configure: setup
-	@[ -f $(BUILD)/build.ninja ] || cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=$(CONFIG) -DSUPINE_DEVELOPER=$(DEVELOPER)
+	@[ -f $(BUILD)/build.ninja ] || cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=$(CONFIG) -DSUPINE_DEVELOPER=$(DEVELOPER) -DSUPINE_SHARED_DATA=$(abspath $(DATA))
 
 build: configure
 	@cmake --build $(BUILD) --parallel $(JOBS)
@@ -70,6 +71,7 @@ style format:
 	@$(clang_format) $(if $(filter style,$@),--dry-run -Werror,-i) $(sources)
 
 study: build
+	@[ -d $(DATA)/hidden-open ] || { echo "$(DATA)/hidden-open is not there; name the folder: make study DATA=dir (docs/data.md)" >&2; exit 2; }
 	@bench/study.sh $(DATA)/hidden-open $(BUILD)/study $(BUILD)/bin
 
 bench: build

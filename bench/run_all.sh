@@ -6,7 +6,7 @@
 #   bench/run_all.sh [DATA] [WORK] [BIN]
 set -uo pipefail
 cd "$(dirname "$0")/.."
-data=${1:-../shared/data}
+data=${1:-data} # docs/data.md
 work=${2:-build/bench}
 bin=${3:-build/bin}
 mkdir -p "$work"

@@ -9,6 +9,7 @@
 #include "pipeline/case/model_file.h"
 #include "pipeline/tool/tool.h"
 #include "simulation/catalogue.h"
+#include "simulation/parameters.h"
 
 namespace supine::pipeline {
 namespace {
@@ -88,16 +89,9 @@ class ModelTool : public Tool {
     const auto say = [&run](const char* key, const Setting& setting) {
       run.say(fmt::format("  {:<36}{}", key, setting_text(setting)));
     };
-    say("breast.young_modulus_kpa", model.breast.young_modulus_kpa);
-    say("breast.poisson_ratio", model.breast.poisson_ratio);
-    say("breast.density_kg_m3", model.breast.density_kg_m3);
-    say("skin.young_modulus_kpa", model.skin.young_modulus_kpa);
-    say("skin.thickness_mm", model.skin.thickness_mm);
-    say("skin.compression_share", model.skin.compression_share);
-    if (model.skin.law == simulation::SkinLaw::corotational) say("skin.poisson_ratio", model.skin.poisson_ratio);
-    say("interface.normal_kpa_per_mm", model.interface.normal_kpa_per_mm);
-    say("interface.tangential_kpa_per_mm", model.interface.tangential_kpa_per_mm);
-    say("cut.stiffness_kpa_per_mm", model.cut.stiffness_kpa_per_mm);
+    for (const Parameter& row : simulation::base_parameters())
+      if (simulation::why_not_of(model, row.name).empty())
+        say(row.name.c_str(), simulation::base_setting(model, row.name));
     for (const auto& effect : model.effects) {
       run.say("effect " + effect.name);
       for (const auto& [key, setting] : effect.parameters) say(key.c_str(), setting);

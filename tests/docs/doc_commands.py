@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Every command of README.md, docs/ and samples/ is checked, and the cheap ones are run.
 
-    doc_commands.py check SOURCE BIN          tools, options, targets, files and links exist
+    doc_commands.py check SOURCE BIN          tools, options, targets, files, paths in backticks and links exist
     doc_commands.py run SOURCE BIN PAGE...    runs the commands of the pages, in order, on a coarse mesh in a new folder
 
 A command is an indented or fenced line (no language, sh, bash) that starts with a known word. Before it is run, "make"
@@ -43,7 +43,12 @@ PLACEHOLDER = re.compile(r"[\[\]…|]|\.\.\.|\b(CASE|OUT|FILE|FOLDER|NAME|MM|EFF
 
 
 def pages(source):
-    return [source / "README.md", *sorted((source / "docs").glob("*.md")), *sorted((source / "samples").glob("**/*.md"))]
+    return [*sorted(source.glob("*.md")), *sorted((source / "docs").glob("*.md")), *sorted((source / "samples").glob("**/*.md"))]
+
+
+def folder_pages(source):
+    """What every folder's README names is checked too; its commands are those of the pages above."""
+    return [page for page in sorted(source.glob("*/README.md")) if page not in pages(source)]
 
 
 def commands(page):
@@ -133,10 +138,47 @@ def check_links(page):
     return wrong
 
 
+# A path names a file of a room by its end, as in `voxels.h`, or from the top of the source or from the page's folder.
+PATH = re.compile(r"(?:[\w.-]+/)*[\w.-]+\.(?:h|cpp|py|sh|awk|cmake|mjs|md)|(?:[\w.-]+/)+[\w.-]*|Makefile")
+ROOMS = ("bench", "calibration", "common", "diagnosis", "docs", "meshing", "phantom", "pipeline", "reconstruction", "samples",
+         "segmentation", "simulation", "tests")
+# Made by a run or by the reader, or the reader's own names.
+MADE = re.compile(r"(^|/)(out|build|answers)(/|$)|^(ladder|calibrated|overlays|dir|own|\d+)/|(^|[/_-])[A-Z]{2,}(?=[/_.-]|$)(?<!README)"
+                  r"|(^|/)my\w*\.")
+
+
+def names_of(source):
+    """Ends of all paths of the repository: file names, and names with the folders above them; folders end in a slash."""
+    ends = set()
+    for room in (source, *(source / name for name in ROOMS)):
+        for path in room.glob("*") if room == source else room.rglob("*"):
+            name = path.relative_to(source).as_posix() + ("/" if path.is_dir() else "")
+            parts = name.rstrip("/").split("/")
+            ends.update("/".join(parts[i:]) + ("/" if path.is_dir() else "") for i in range(len(parts)))
+    return ends
+
+
+def check_paths(page, source, ends):
+    wrong, fence = [], False
+    for number, line in enumerate(page.read_text().splitlines(), 1):
+        if line.lstrip().startswith("```"):
+            fence = not fence
+        for quoted in [] if fence or line.startswith("    ") else re.findall(r"`([^`]+)`", line):
+            path = quoted.split(" ")[0]
+            if not PATH.fullmatch(path) or MADE.search(path):
+                continue
+            ours = path.split("/")[0] in ROOMS or not path.endswith("/")
+            if ours and not {path, path + "/"} & ends and not (source / path).exists():
+                wrong.append(f"{page.relative_to(source)}:{number}: there is no {path}")
+    return wrong
+
+
 def check(source, bin_folder):
-    wrong, count = [], 0
+    wrong, count, ends = [], 0, names_of(source)
+    for page in folder_pages(source):
+        wrong += check_links(page) + check_paths(page, source, ends)
     for page in pages(source):
-        wrong += check_links(page)
+        wrong += check_links(page) + check_paths(page, source, ends)
         for number, command in commands(page):
             count += 1
             for reason in (check_tool(command, bin_folder), check_make(command, source), check_files(command, source)):

@@ -58,6 +58,16 @@ TEST_F(Make, RunsNothingAgainAndPrintsTheFigures) {
   expect_words(finished.out, {"RMS", "tetrahedra", "sag", "comparison.vtp"});
 }
 
+TEST_F(Make, PrintsTheBlockOfAStageThatIsUpToDateAgain) {
+  fs::remove(out() / "comparison.vtp");
+  const Finished first = make({"compare"});
+  expect_words(first.out, {"== compare supine", "MAE, scan to model"});
+  const Finished second = make({"compare"});
+  EXPECT_EQ(second.code, 0) << second.err;
+  EXPECT_FALSE(contains(second.out, "==")) << "run again: " << second.out;
+  EXPECT_EQ("== compare supine\n" + second.out, first.out);
+}
+
 TEST_F(Make, RunsOnlyWhatDependsOnTheChange) {
   touch("supine.ply");
   const Finished scan = make({"-n"});
