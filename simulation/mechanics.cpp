@@ -61,6 +61,16 @@ Eigen::VectorXd det_f_of(const Indices& cells, const Points& x, const Points& X,
   return smallest;
 }
 
+template <class Element>
+double volume_of(const Indices& cells, const Points& x) {
+  double volume = 0;
+  for (int c = 0; c < cells.rows(); ++c) {
+    const auto nodes = gather<Element::nodes>(x, cells, c);
+    for (int p = 0; p < Element::points; ++p) volume += Element::table().weight[p] * tet_point<Element>(nodes, p).det;
+  }
+  return volume;
+}
+
 }  // namespace
 
 Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model)
@@ -116,6 +126,10 @@ void Mechanics::hold(const Demand& demand, Sums& sums) const {
   };
   if (demand.tangent) identity_rows(sums.tangent);
   if (demand.reference_tangent) identity_rows(sums.reference_tangent);
+}
+
+double volume_mm3(const Indices& cells, const Points& x) {
+  return cells.cols() == 10 ? volume_of<Tet10>(cells, x) : volume_of<Tet4>(cells, x);
 }
 
 Eigen::VectorXd cell_det_f(const Indices& cells, const Points& x, const Points& X) {

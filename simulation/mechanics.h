@@ -52,4 +52,7 @@ Eigen::VectorXd cell_det_f(const Indices& cells, const Points& x, const Points& 
 /// The same over the quadrature points alone: what the energy sees.
 Eigen::VectorXd cell_det_f_at_points(const Indices& cells, const Points& x, const Points& X);
 
+/// Volume of a mesh in the shape @p x (#N by 3, mm) by the cells' quadrature, mm³.
+double volume_mm3(const Indices& cells, const Points& x);
+
 }  // namespace supine::simulation

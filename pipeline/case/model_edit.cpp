@@ -95,15 +95,14 @@ const toml::table* section_of(const toml::table& file, const std::string& sectio
   return nullptr;
 }
 
-/// Where the number of a free parameter stands in the file.
+/// Where the number of a parameter stands in the file, whether it is fixed (name = 1) or free (name = { value = 1 }).
 toml::source_region value_place(const toml::table& table, const fs::path& file, const std::string& name) {
   const auto dot = name.find('.');
   const toml::table* section = section_of(table, name.substr(0, dot));
-  const toml::table* entry = section ? section->get_as<toml::table>(name.substr(dot + 1)) : nullptr;
-  const toml::node* value = entry ? entry->get("value") : nullptr;
-  if (value == nullptr)
-    throw InputError(fmt::format("{} does not hold {} as a table {{ value = ... }}, so its value cannot be replaced",
-                                 file.string(), name));
+  const toml::node* value = section ? section->get(name.substr(dot + 1)) : nullptr;
+  if (value != nullptr && value->is_table()) value = value->as_table()->get("value");
+  if (value == nullptr || !value->is_number())
+    throw InputError(fmt::format("{} holds no number {}, so it cannot be replaced; write one", file.string(), name));
   return value->source();
 }
 

@@ -23,9 +23,10 @@ std::string with_effect(const std::filesystem::path& file, const std::string& na
 /// @throws InputError  effect not in the file
 std::string without_effect(const std::filesystem::path& file, const std::string& name);
 
-/// The text of a model.toml with other values of free parameters; everything else, comments too, stays byte for byte.
+/// The text of a model.toml with other values of parameters, fixed or free; everything else, comments too, stays byte
+/// for byte.
 /// @param values  by name (parameters.h), written with all their digits
-/// @throws InputError  a parameter that the file does not hold as a table { value = … }
+/// @throws InputError  a parameter whose number the file does not hold
 std::string with_values(const std::filesystem::path& file, const std::map<std::string, double>& values);
 
 }  // namespace supine::pipeline

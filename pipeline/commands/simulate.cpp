@@ -2,17 +2,20 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <fstream>
 
 #include "common/error.h"
 #include "common/landmarks.h"
 #include "common/rms.h"
 #include "meshing/mesh_io.h"
 #include "pipeline/case/case.h"
+#include "pipeline/case/model_edit.h"
 #include "pipeline/case/model_file.h"
 #include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/embedding.h"
 #include "simulation/export/exported_pose.h"
+#include "simulation/solve/carrying_modulus.h"
 #include "simulation/solve/chain.h"
 #include "simulation/solve/linear_solver.h"
 #include "simulation/terms/bulk.h"
@@ -71,7 +74,8 @@ class SimulateTool : public Tool {
            "Examples:\n"
            "  supine-simulate mycase mycase/out/mesh.vtu\n"
            "  supine-simulate mycase mycase/out/mesh.vtu --model stiff.toml --pose supine -o trial\n"
-           "  supine-simulate mycase mycase/out/mesh.vtu --export calculix -o trial\n";
+           "  supine-simulate mycase mycase/out/mesh.vtu --export calculix -o trial\n"
+           "  supine-simulate mycase mycase/out/mesh.vtu --find-modulus -o trial     (then --model trial/model.toml)\n";
   }
 
   void declare(CLI::App& app) override {
@@ -88,6 +92,12 @@ class SimulateTool : public Tool {
                    "also write every pose, from the undeformed shape, as input for another solver: calculix, febio, "
                    "sofa (docs/second-opinion.md)")
         ->check(CLI::IsMember({"calculix", "febio", "sofa"}));
+    app.add_flag(
+           "--find-modulus", find_modulus_,
+           "only find the softest breast.young_modulus_kpa (kPa, to 5 %) that carries the body in every pose, and "
+           "write model.toml with it")
+        ->excludes("--export")
+        ->excludes("--inverse");
   }
 
   Outcome run(Run& run) override {
@@ -97,6 +107,7 @@ class SimulateTool : public Tool {
     if (!export_to_.empty())
       simulation::check_exportable(solvers.at(export_to_), in.mesh, in.anatomy, in.model, in.loads);
     run.stage("solve");
+    if (find_modulus_) return find_modulus(run, in);
     simulation::SolveOptions options;
     options.progress = [&run](const std::string& what, double load, int iteration, double share) {
       run.progress(fmt::format("{}: load {:.0f} %, iteration {}, {:.1e} of the weight unbalanced", what, 100 * load,
@@ -117,6 +128,27 @@ class SimulateTool : public Tool {
     const auto poisson = Eigen::VectorXd::Constant(in.mesh.cells.rows(), in.model.breast.poisson_ratio.value);
     const std::string warning = simulation::locking_warning(in.mesh.order(), poisson, in.model.breast.volumetric);
     if (!warning.empty()) run.warn(warning);
+  }
+
+  /// The model as it stands with the modulus that was found: a value or a table { value = … }.
+  Outcome find_modulus(Run& run, const Inputs& in) const {
+    simulation::ModulusSearch search;
+    search.progress = [&run](double kpa) { run.progress(fmt::format("breast.young_modulus_kpa = {:.3g}", kpa)); };
+    const auto found = simulation::find_carrying_modulus(in.mesh, in.anatomy, in.model, in.loads, search);
+    const fs::path model = model_file_.empty() ? case_folder_ / "model.toml" : model_file_;
+    const fs::path target = folder() / "model.toml";
+    std::ofstream(run.output(target), std::ios::binary)
+        << with_values(model, {{"breast.young_modulus_kpa", found.carries_kpa}});
+    Json& f = run.figures(target);
+    f["carries_kpa"] = found.carries_kpa;
+    f["fails_kpa"] = found.fails_kpa ? Json(*found.fails_kpa) : Json(nullptr);
+    f["chains"] = found.chains;
+    run.say(fmt::format(
+        "breast.young_modulus_kpa = {:.3g} carries the body in every pose, {} ({} chains); {} has it",
+        found.carries_kpa,
+        found.fails_kpa ? fmt::format("{:.3g} does not", *found.fails_kpa) : std::string("nothing softer was tried"),
+        found.chains, target.string()));
+    return Outcome::done;
   }
 
   Outcome judge(Run& run, const ChainSolution& solution) const {
@@ -256,6 +288,10 @@ class SimulateTool : public Tool {
     f["min_det_f"] = report.min_det_f;
     f["folded_cells"] = report.folded_cells;
     f["residual_share"] = report.residual_share;
+    const double undeformed = simulation::volume_mm3(in.mesh.cells, solution.X);
+    const double volume = simulation::volume_mm3(in.mesh.cells, x);
+    f["volume_ml"] = 1e-3 * volume;
+    f["volume_change"] = volume / undeformed - 1;
     f["displacement_from_prone_mm"] = {{"rms", rms(from_prone)}, {"max", from_prone.maxCoeff()}};
     f["displacement_from_undeformed_mm"] = {{"rms", rms(from_undeformed)}, {"max", from_undeformed.maxCoeff()}};
     const auto place = [&x](int point) -> Json {
@@ -292,6 +328,7 @@ class SimulateTool : public Tool {
   fs::path case_folder_, mesh_file_, model_file_;
   std::vector<std::string> pose_names_;
   std::string inverse_ = "newton", export_to_;
+  bool find_modulus_ = false;
 };
 
 }  // namespace

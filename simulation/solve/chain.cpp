@@ -49,6 +49,19 @@ void note_folds(const meshing::TetMesh& mesh, const Points& shape, const std::st
   if (folds.cells > 0) warnings.push_back(folds_warning(name, folds));
 }
 
+/// Where all stiffness grows alike, equilibrium depends on weight over stiffness alone: E / load would carry what E
+/// carried a share of. The skin and the springs do not grow with the breast's modulus, so that is a first guess.
+std::string modulus_advice(const Model& model, double load) {
+  constexpr double telling_load = 0.02;  // under this share the guess is no better than none
+  const double kpa = model.breast.young_modulus_kpa.value;
+  const std::string guess =
+      load < telling_load
+          ? std::string()
+          : fmt::format("About breast.young_modulus_kpa = {:.2g} would carry it ({:.3g} carried {:.0f} %). ",
+                        kpa / load, kpa, 100 * load);
+  return ". " + guess + "supine-simulate --find-modulus finds the least that does";
+}
+
 Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
   return {.mesh = mechanics.mesh(), .anatomy = mechanics.anatomy(), .layout = mechanics.layout(), .pose = pose};
 }
@@ -68,6 +81,14 @@ Fields<Dual> Chain::fields(const Model& model, const PoseLoad& pose, const std::
 void Chain::load(const Model& model, const PoseLoad& pose) { mechanics_.set_fields(values_of(fields(model, pose))); }
 
 ChainSolution Chain::solve(const Model& model, const ChainSolution* near, InverseMethod method) {
+  try {
+    return solve_all(model, near, method);
+  } catch (const NoEquilibrium& failure) {
+    throw NoEquilibrium(failure.what() + modulus_advice(model, failure.load()), failure.load());
+  }
+}
+
+ChainSolution Chain::solve_all(const Model& model, const ChainSolution* near, InverseMethod method) {
   const meshing::TetMesh& mesh = mechanics_.mesh();
   solver_.forget();
   ChainSolution solution;

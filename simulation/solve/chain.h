@@ -61,7 +61,8 @@ class Chain {
   /// @param near   solution for similar numbers to start from, or nullptr to start from the imaged shape and no load;
   ///   when that fails it starts without
   /// @return without round trip and second shapes, see certify()
-  /// @throws NumericalFailure  naming the pose: no equilibrium, or a cell inverted there
+  /// @throws NoEquilibrium  naming the pose, how far its load came and the modulus that might carry it
+  /// @throws NumericalFailure  naming the pose and the cell that is inverted there
   /// @throws InputError  what make_fields refuses
   ChainSolution solve(const Model& model, const ChainSolution* near = nullptr,
                       InverseMethod method = InverseMethod::newton);
@@ -77,6 +78,7 @@ class Chain {
 
  private:
   friend class Sensitivities;
+  ChainSolution solve_all(const Model& model, const ChainSolution* near, InverseMethod method);
   void load(const Model& model, const PoseLoad& pose);
   void solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
   void correct_by_fixed_point(const Model& model, ChainSolution& solution);

@@ -129,7 +129,7 @@ SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, P
     step = 0.5 * (target - load);
     const bool crushed = last.end != Termination::inverted && last.min_det_f < crushed_det_f;
     if (step < options_.smallest_load_step * (crushed ? crushed_step_factor : 1))
-      throw NumericalFailure(failure(last, load, trial));
+      throw NoEquilibrium(failure(last, load, trial), load);
   }
   sought = at_load;
   return report;

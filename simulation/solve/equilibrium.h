@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "common/error.h"
 #include "simulation/mechanics.h"
 #include "simulation/solve/newton_direction.h"
 
@@ -58,6 +59,17 @@ struct SolveReport {
   double residual_share = 0;  ///< |r| / |w| at the end, as in Termination; 0 without weight
   Termination termination = Termination::residual_small;  ///< of the last load step: one of the converged
   int folded_cells = 0;  ///< filled by Chain: quadratic cells inside out between their quadrature points (folds.h)
+};
+
+/// No shape in balance was found under the whole load.
+class NoEquilibrium : public NumericalFailure {
+ public:
+  NoEquilibrium(const std::string& message, double load) : NumericalFailure(message), load_(load) {}
+  /// The largest share of the load that was balanced, 0 to 1.
+  double load() const { return load_; }
+
+ private:
+  double load_;
 };
 
 /// Finds equilibrium r(x, X) = 0 by Newton's method with exact tangents, line search and adaptive load steps: the full

@@ -85,8 +85,13 @@ TEST_F(ModelEdit, NewValuesKeepEverythingElse) {
   EXPECT_EQ(model.skin.young_modulus_kpa.value, 33.25);
 }
 
-TEST_F(ModelEdit, NewValuesAreForFreeParametersOnly) {
-  EXPECT_THROW(with_values(file(base), {{"breast.young_modulus_kpa", 1}}), InputError);
+TEST_F(ModelEdit, AFixedNumberIsReplacedToo) {
+  EXPECT_EQ(with_values(file(base), {{"breast.young_modulus_kpa", 0.25}}),
+            "# my notes\n[breast]\nyoung_modulus_kpa = 0.25  # from the clinic\n");
+}
+
+TEST_F(ModelEdit, NewValuesAreForNumbersThatStandInTheFile) {
+  EXPECT_THROW(with_values(file(base), {{"skin.young_modulus_kpa", 1}}), InputError);
   EXPECT_THROW(with_values(file(base), {{"ligament.stiffness_kpa_per_mm", 1}}), InputError);
 }
 
