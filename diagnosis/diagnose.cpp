@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "diagnosis/chi_squared.h"
+#include "simulation/catalogue.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -37,10 +38,10 @@ double p_of(const ScoreTable& table) {
   return p;
 }
 
-/// How many poses that are not fitted judge the refit. A scan that lies elsewhere says nothing of where another lies.
+/// How many poses that are not fitted judge the refit.
 std::size_t unfitted_judges(const Refit& refit, const BaseFigures& base) {
-  const bool seen = refit.pose_rms_mm.size() == base.pose_rms_mm.size() && refit.effect != "misregistration";
-  return seen ? base.unfitted_poses : 0;
+  const bool seen = refit.pose_rms_mm.size() == base.pose_rms_mm.size();
+  return seen && unfitted_scans_judge(refit, base.unfitted_poses) ? base.unfitted_poses : 0;
 }
 
 /// Share of what some of the poses predicted without themselves have above the noise that the refit takes away, in
@@ -212,11 +213,6 @@ std::string verdict_name(Verdict verdict) {
   return {};
 }
 
-bool is_measurement_effect(const std::string& effect) {
-  return effect == "misregistration" || effect == "gravity_tilt" || effect == "segmentation_offset" ||
-         effect == "incompressibility";
-}
-
 LackOfFit lack_of_fit(const WeightedFit& fit, const Metric& metric) {
   const calibration::Fit& f = fit.fit;
   const Eigen::VectorXd white = metric.whitening->apply(f.residuals.distance_mm + metric.mean_mm);
@@ -254,7 +250,7 @@ Diagnosis decide(const ScoreTable& table, const std::vector<Refit>& refits, cons
     return result;
   }
   for (const Refit* refit : good) result.missing.push_back(refit->effect);
-  std::stable_partition(result.missing.begin(), result.missing.end(), is_measurement_effect);
+  std::stable_partition(result.missing.begin(), result.missing.end(), simulation::is_measurement_effect);
   result.verdict = result.missing.size() == 1 ? Verdict::missing : Verdict::ambiguous;
   result.why = result.verdict == Verdict::missing ? "no other effect comes near" : "these do equally well";
   if (p >= rules.p_value && shown)

@@ -13,9 +13,6 @@ enum class Verdict { nothing_missing, missing, ambiguous, unexplained };
 /// nothing_missing, missing, ambiguous, unexplained.
 std::string verdict_name(Verdict verdict);
 
-/// Causes that lie in the measurement or in the numbers, not in the breast: named first where several do as well.
-bool is_measurement_effect(const std::string& effect);
-
 /// Bounds of the verdict (docs/diagnosis.md).
 struct VerdictRules {
   double p_value = 0.05;         ///< of the best candidate, over the whole catalogue

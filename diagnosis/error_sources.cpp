@@ -5,11 +5,13 @@
 #include <cmath>
 
 #include "calibration/noise.h"
+#include "simulation/catalogue.h"
 
 namespace supine::diagnosis {
 namespace {
 
 using calibration::Residuals;
+using simulation::traits_of;
 
 /// The scanner's noise as the case says, or as neighbouring points show it where that is more: noise across the normal
 /// comes on top where the skin is steep.
@@ -27,16 +29,6 @@ Eigen::VectorXd noise_of(const Residuals& residuals) {
   return noise;
 }
 
-std::string source_of(const std::string& effect) {
-  if (effect == "misregistration") return "registration";
-  if (effect == "segmentation_offset") return "segmentation";
-  if (effect == "chest_wall_motion") return "chest_wall";
-  if (effect == "incompressibility") return "numerical";
-  return {};
-}
-
-bool is_of_each_scan(const std::string& source) { return source == "registration" || source == "chest_wall"; }
-
 /// The shape in each pose by itself: scans lie elsewhere, and breath stands elsewhere, in their own ways.
 void add_by_pose(const Residuals& residuals, const ErrorMode& mode, std::vector<ErrorMode>& modes) {
   for (int pose = 0; pose <= residuals.pose.maxCoeff(); ++pose)
@@ -46,17 +38,15 @@ void add_by_pose(const Residuals& residuals, const ErrorMode& mode, std::vector<
 
 }  // namespace
 
-double tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& t) {
-  if (effect == "misregistration") return unit == "rad" ? t.registration_rad : t.registration_mm;
-  if (effect == "segmentation_offset") return t.segmentation_mm;
-  if (effect == "chest_wall_motion") return unit == "1" ? 0 : t.chest_wall_mm;
-  return effect == "incompressibility" ? t.incompressibility : 0;
+double tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& tolerances) {
+  const simulation::Effect* found = simulation::find_effect(effect);
+  return found == nullptr ? 0 : found->tolerance(unit, tolerances);
 }
 
 double shared_tolerance_for(const std::string& effect, const std::string& unit, const Tolerances& tolerances,
                             std::size_t poses) {
   const double each = tolerance_for(effect, unit, tolerances);
-  return is_of_each_scan(source_of(effect)) ? each / std::sqrt(static_cast<double>(poses)) : each;
+  return traits_of(effect).error_of_each_scan ? each / std::sqrt(static_cast<double>(poses)) : each;
 }
 
 bool errors_imitate(const std::string& effect) { return tolerance_for(effect, {}, Tolerances{}) > 0; }
@@ -74,7 +64,8 @@ void set_numerical(const NumericalError& numerical, const Tolerances& tolerances
 
 ErrorSources without_tolerance_for(const std::string& effect, const ErrorSources& sources) {
   ErrorSources rest = sources;
-  std::erase_if(rest.modes, [own = source_of(effect)](const ErrorMode& mode) { return mode.source == own; });
+  std::erase_if(rest.modes,
+                [own = traits_of(effect).error_source](const ErrorMode& mode) { return mode.source == own; });
   return rest;
 }
 
@@ -87,11 +78,12 @@ ErrorSources error_sources(const Residuals& residuals, const std::vector<Candida
   sources.spread_mm = fallback.spread_mm;
   sources.length_mm = fallback.length_mm;
   for (const Candidate& candidate : candidates) {
-    const std::string source = source_of(candidate.effect);
-    for (std::size_t k = 0; !source.empty() && k < candidate.parameters.size(); ++k) {
-      const ErrorMode mode{source, tolerance_for(candidate.effect, candidate.parameters[k].unit, tolerances) *
-                                       candidate.slope.col(static_cast<Eigen::Index>(k))};
-      if (is_of_each_scan(source))
+    const simulation::EffectTraits traits = traits_of(candidate.effect);
+    for (std::size_t k = 0; !traits.error_source.empty() && k < candidate.parameters.size(); ++k) {
+      const ErrorMode mode{traits.error_source,
+                           tolerance_for(candidate.effect, candidate.parameters[k].unit, tolerances) *
+                               candidate.slope.col(static_cast<Eigen::Index>(k))};
+      if (traits.error_of_each_scan)
         add_by_pose(residuals, mode, sources.modes);
       else
         sources.modes.push_back(mode);

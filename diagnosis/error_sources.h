@@ -8,16 +8,12 @@
 #include "calibration/error_model.h"
 #include "diagnosis/candidates.h"
 #include "diagnosis/numerical_error.h"
+#include "simulation/effect.h"
 
 namespace supine::diagnosis {
 
 /// How well things are known that no tissue effect should be blamed for.
-struct Tolerances {
-  double registration_mm = 0.3;      ///< shift of the scan, 1 sigma in each direction
-  double registration_rad = 0.0036;  ///< turn of the scan: 0.3 mm at 83 mm
-  double segmentation_mm = 0.3;      ///< offset of the imaged skin: a fifth of a 1.5 mm voxel
-  double chest_wall_mm = 1;          ///< the muscle between two scans: breath, and where its border was drawn
-  double incompressibility = 0.1;    ///< of the catalogue's a: ν itself is assumed
+struct Tolerances : simulation::MeasurementTolerances {
   double effect_form = 0.07;  ///< of the size of a tissue effect: where it ends and how it mixes are the catalogue's
   double correction = 1;      ///< share of the finer mesh's change that is added to the distances, give or take
                               ///< NumericalError::finer_doubt of it

@@ -8,6 +8,7 @@
 
 #include "common/error.h"
 #include "diagnosis/diagnose.h"
+#include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -162,7 +163,7 @@ void settle(const calibration::MeasuredScene& scene, const ErrorSources& sources
       if (strengths.size() == 1 && p.name == parameters.names()[static_cast<std::size_t>(i)])
         p = profiled(scene, now, parameters, fit, i, p);
     const double size = std::abs(p.value - simulation::find_parameter(p.name)->null);
-    const double form = is_measurement_effect(refit.effect) ? 0 : tolerances.effect_form * size;
+    const double form = simulation::is_measurement_effect(refit.effect) ? 0 : tolerances.effect_form * size;
     widen(std::hypot(form, tolerance_for(refit.effect, p.unit, tolerances)), p);
   }
 }

@@ -10,6 +10,7 @@
 #include "calibration/model_skin.h"
 #include "calibration/scan_motion.h"
 #include "common/error.h"
+#include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -94,9 +95,10 @@ class Pose {
                           std::max(1.0, points);
     const double shared = found_.sources.spread_mm * found_.sources.spread_mm;
     Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(n, n);
-    for (const auto& row : simulation::find_effect("misregistration")->parameters()) {
+    const simulation::Effect& place = simulation::place_of_scan();
+    for (const auto& row : place.parameters()) {
       const Eigen::VectorXd mode =
-          tolerance_for("misregistration", row.unit, found_.tolerances) * slope("misregistration." + row.name);
+          place.tolerance(row.unit, found_.tolerances) * slope(simulation::parameter_name(place, row));
       sigma.noalias() += mode * mode.transpose();
     }
     for (Eigen::Index i = 0; i < n; ++i)
@@ -145,7 +147,7 @@ Eigen::MatrixXd stacked(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
 /// The effect at its size, or as something to be fitted. A scan that lies elsewhere lies elsewhere in its own way each
 /// time: its parameters are others in the further pose.
 Eigen::MatrixXd fitted_columns(const Candidate& effect, const Eigen::MatrixXd& now, const Eigen::MatrixXd& then) {
-  if (effect.effect != "misregistration") return stacked(now, then);
+  if (!simulation::traits_of(effect.effect).moves_scan) return stacked(now, then);
   Eigen::MatrixXd both = Eigen::MatrixXd::Zero(now.rows() + then.rows(), 2 * now.cols());
   both.topLeftCorner(now.rows(), now.cols()) = now;
   both.bottomRightCorner(then.rows(), then.cols()) = then;
@@ -177,7 +179,7 @@ void rate_pairs(const Findings& found, const std::vector<const Candidate*>& effe
   for (std::size_t i = 0; i < in_set; ++i)
     for (std::size_t j = 0; j < in_set; ++j) {
       if (i == j) continue;
-      const bool moves = effects[i]->effect == "misregistration";
+      const bool moves = simulation::traits_of(effects[i]->effect).moves_scan;
       const Eigen::VectorXd size = size_of(found, *effects[i]);
       Eigen::VectorXd signal(base.rows());
       signal << now.effect[i] * size, (moves ? 0.0 : 1.0) * (then.effect[i] * size);

@@ -9,6 +9,7 @@
 #include "common/rms.h"
 #include "diagnosis/candidates.h"
 #include "diagnosis/left_out_pose.h"
+#include "simulation/catalogue.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -139,7 +140,7 @@ void add_left_out(const FreeParameters& parameters, const WeightedFit& fit, cons
 
 bool says_the_scan_lies_elsewhere(const simulation::Model& model) {
   return std::any_of(model.effects.begin(), model.effects.end(),
-                     [](const auto& effect) { return effect.name == "misregistration"; });
+                     [](const auto& effect) { return simulation::traits_of(effect.name).moves_scan; });
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "calibration/held_out.h"
 #include "common/error.h"
 #include "common/rms.h"
+#include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -202,6 +203,10 @@ void side_by_side(const RefitProblem& problem, std::vector<Job*>& jobs, const st
 }
 
 }  // namespace
+
+bool unfitted_scans_judge(const Refit& refit, std::size_t unfitted_poses) {
+  return unfitted_poses > 0 && !refit.pose_rms_mm.empty() && !simulation::traits_of(refit.effect).moves_scan;
+}
 
 simulation::EffectSetting free_setting(const std::string& name) {
   const simulation::Effect& effect = *simulation::find_effect(name);

@@ -38,6 +38,10 @@ struct Refit {
   WeightedFit fit;
 };
 
+/// Whether scans that were not fitted say anything of the refit: there are some with points over the skin, and what was
+/// added is not that a scan lies elsewhere, which says nothing of where another lies.
+bool unfitted_scans_judge(const Refit& refit, std::size_t unfitted_poses);
+
 /// The effect with its strength free and without a prior, because how large it usually is shall not decide whether it
 /// is there; its place and shape free with the catalogue's spread, because nobody knows them.
 simulation::EffectSetting free_setting(const std::string& effect);

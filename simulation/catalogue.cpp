@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/catalogue.h"
 
+#include <algorithm>
+
 #include "common/error.h"
 #include "simulation/effects/adhesion.h"
 #include "simulation/effects/arm_traction.h"
@@ -21,11 +23,6 @@
 #include "simulation/effects/tissue_stiffness.h"
 
 namespace supine::simulation {
-
-const std::vector<OptionRow>& Effect::options() const {
-  static const std::vector<OptionRow> none;
-  return none;
-}
 
 namespace {
 
@@ -73,6 +70,21 @@ const Effect* find_effect(const std::string& name) {
   for (const Effect* effect : catalogue())
     if (effect->name() == name) return effect;
   return nullptr;
+}
+
+EffectTraits traits_of(const std::string& effect) {
+  const Effect* found = find_effect(effect);
+  return found == nullptr ? EffectTraits{} : found->traits();
+}
+
+bool is_measurement_effect(const std::string& effect) {
+  const EffectKind kind = traits_of(effect).kind;
+  return kind == EffectKind::measurement || kind == EffectKind::numerical;
+}
+
+const Effect& place_of_scan() {
+  return **std::find_if(catalogue().begin(), catalogue().end(),
+                        [](const Effect* effect) { return effect->traits().moves_scan; });
 }
 
 const std::vector<Parameter>& base_parameters() {

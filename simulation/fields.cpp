@@ -247,7 +247,8 @@ void check_effects_act(const Model& model, const Scene& scene) {
     const auto refuse = [&setting](const char* reason) {
       throw InputError(fmt::format("effect '{}' cannot change anything here: {}", setting.name, reason));
     };
-    if (scene.pose == "prone" && find_effect(setting.name) != nullptr && find_effect(setting.name)->needs_other_pose())
+    if (scene.pose == "prone" && find_effect(setting.name) != nullptr &&
+        find_effect(setting.name)->traits().acts_in != ActsIn::every_pose)
       refuse("prone is the only pose and it acts between poses; give the case another one or remove the effect");
     const char* unread = nullptr;
     bool acts = false;

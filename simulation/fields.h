@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "common/arrays.h"
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 #include "simulation/model.h"
 
 namespace supine::meshing {

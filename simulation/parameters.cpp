@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "common/error.h"
+#include "simulation/catalogue.h"
 
 namespace supine::simulation {
 

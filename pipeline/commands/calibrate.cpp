@@ -13,6 +13,7 @@
 #include "pipeline/case/model_edit.h"
 #include "pipeline/case/model_file.h"
 #include "pipeline/results/calibration_report.h"
+#include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
 namespace supine::pipeline {
@@ -26,8 +27,8 @@ using calibration::FreeParameters;
 /// The scan's place as six more unknowns, with the catalogue's priors.
 void add_scan_offset(simulation::Model& model) {
   for (const auto& effect : model.effects)
-    if (effect.name == "misregistration") return;
-  const simulation::Effect& effect = *simulation::find_effect("misregistration");
+    if (simulation::traits_of(effect.name).moves_scan) return;
+  const simulation::Effect& effect = simulation::place_of_scan();
   simulation::EffectSetting setting = simulation::null_setting(effect);
   for (const simulation::Parameter& row : effect.parameters())
     setting.parameters[row.name] = {row.null, true, row.log_sd, row.lower, row.upper};
@@ -243,7 +244,7 @@ class CalibrateTool : public Tool {
     const fs::path temporary = run.output(model_file);
     fs::copy_file(measured_->model_file, temporary, fs::copy_options::overwrite_existing);
     if (parameters.base().effects.size() > measured_->model.effects.size()) {
-      const std::string text = with_effect(temporary, "misregistration");
+      const std::string text = with_effect(temporary, simulation::place_of_scan().name());
       std::ofstream(temporary, std::ios::binary) << text;
     }
     std::map<std::string, double> values;

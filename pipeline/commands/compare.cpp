@@ -17,6 +17,7 @@
 #include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/catalogue.h"
+#include "simulation/fields.h"
 
 namespace supine::pipeline {
 namespace {
@@ -145,12 +146,14 @@ class CompareTool : public Tool {
   /// Where the model says that the scan lies. Its centroid is that of the points a Scan keeps, as in calibration.
   static calibration::ScanMotion scan_motion(const Inputs& inputs, const calibration::ModelSkin& model,
                                              const std::string& scan_name) {
+    const bool says = std::any_of(inputs.model.effects.begin(), inputs.model.effects.end(),
+                                  [](const auto& effect) { return simulation::traits_of(effect.name).moves_scan; });
     Eigen::VectorXd motion = Eigen::VectorXd::Zero(6);
-    for (const auto& effect : inputs.model.effects) {
-      if (effect.name != "misregistration") continue;
-      const auto& rows = simulation::find_effect(effect.name)->parameters();
-      for (std::size_t i = 0; i < rows.size(); ++i)
-        motion[static_cast<Eigen::Index>(i)] = effect.parameters.at(rows[i].name).value;
+    if (says) {
+      const auto anatomy = meshing::compute_anatomy(inputs.predicted.mesh, inputs.measured.side);
+      const auto layout = simulation::make_layout(inputs.predicted.mesh, anatomy);
+      const simulation::Scene scene{inputs.predicted.mesh, anatomy, layout, inputs.pose.name};
+      motion = simulation::values_of(simulation::make_fields(inputs.model, scene, inputs.pose.gravity)).scan_motion;
     }
     if (motion.isZero(0)) return {motion, inputs.surface.points};
     return {motion, calibration::Scan(inputs.surface, model, scan_name).points()};

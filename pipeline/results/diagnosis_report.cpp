@@ -61,16 +61,11 @@ Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, 
 
 Json number_or_null(const std::vector<double>& values) { return values.empty() ? Json(nullptr) : Json(values); }
 
-/// A scan that lies elsewhere says nothing of where another one lies.
-bool unfitted_scans_judge(const Findings& found, const Refit& refit) {
-  return found.others.unfitted > 0 && !refit.pose_rms_mm.empty() && refit.effect != "misregistration";
-}
-
 Json left_json(const diagnosis::LackOfFit& left) { return {{"misfit", left.misfit}, {"p_value", left.p_value}}; }
 
 Json candidate_json(const Findings& found, const Score& score) {
   const Refit* refit = refit_of(found, score.effect);
-  const bool judged = refit && unfitted_scans_judge(found, *refit);
+  const bool judged = refit && unfitted_scans_judge(*refit, found.others.unfitted);
   return {
       {"effect", score.effect},
       {"p_value", score.p_value},
@@ -172,14 +167,14 @@ void say_refits(const Run& run, const Findings& found) {
     if (!refit.solved)
       run.say(fmt::format("  {:<20}  no equilibrium", refit.effect));
     else
-      run.say(fmt::format("  {:<20}{:>9.1f}{:>8.3f}{:>10.3f}{:>10}{:>8}{:>8.2f}   {}{}", refit.effect, refit.bic,
-                          refit.rms_mm, refit.held_out_rms_mm,
-                          refit.pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", refit.pose_rms_mm[0]),
-                          unfitted_scans_judge(found, refit) ? fmt::format("{:.1f}", refit.pose_gain) : "-",
-                          found.left[r].misfit, values_of(refit.parameters),
-                          !refit.finished   ? " (given up early)"
-                          : refit.at_border ? " (place or width at the border of its range)"
-                                            : ""));
+      run.say(fmt::format(
+          "  {:<20}{:>9.1f}{:>8.3f}{:>10.3f}{:>10}{:>8}{:>8.2f}   {}{}", refit.effect, refit.bic, refit.rms_mm,
+          refit.held_out_rms_mm, refit.pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", refit.pose_rms_mm[0]),
+          unfitted_scans_judge(refit, found.others.unfitted) ? fmt::format("{:.1f}", refit.pose_gain) : "-",
+          found.left[r].misfit, values_of(refit.parameters),
+          !refit.finished   ? " (given up early)"
+          : refit.at_border ? " (place or width at the border of its range)"
+                            : ""));
   }
 }
 

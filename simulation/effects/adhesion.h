@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 
@@ -10,6 +10,7 @@ class Adhesion : public Effect {
  public:
   std::string name() const override { return "adhesion"; }
   std::string meaning() const override { return "inner surface attached to the muscle instead of sliding"; }
+  EffectTraits traits() const override { return {.kind = EffectKind::boundary}; }
   const std::vector<Parameter>& parameters() const override;
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 
@@ -12,8 +12,8 @@ class ArmTraction : public Effect {
  public:
   std::string name() const override { return "arm_traction"; }
   std::string meaning() const override { return "pull of the raised or lowered arm on the skin near the armpit"; }
+  EffectTraits traits() const override { return {.kind = EffectKind::boundary, .acts_in = ActsIn::all_but_imaged}; }
   const std::vector<Parameter>& parameters() const override;
-  bool needs_other_pose() const override { return true; }
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 };

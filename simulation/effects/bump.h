@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 

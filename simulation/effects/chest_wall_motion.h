@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 
@@ -12,8 +12,16 @@ class ChestWallMotion : public Effect {
  public:
   std::string name() const override { return "chest_wall_motion"; }
   std::string meaning() const override { return "chest wall that has another shape than in the scanner"; }
+  EffectTraits traits() const override {
+    return {.kind = EffectKind::boundary,
+            .acts_in = ActsIn::all_but_imaged,
+            .error_source = "chest_wall",
+            .error_of_each_scan = true};
+  }
+  double tolerance(const std::string& unit, const MeasurementTolerances& known) const override {
+    return unit == "1" ? 0 : known.chest_wall_mm;
+  }
   const std::vector<Parameter>& parameters() const override;
-  bool needs_other_pose() const override { return true; }
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 };

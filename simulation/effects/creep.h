@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 
@@ -12,8 +12,8 @@ class Creep : public Effect {
  public:
   std::string name() const override { return "creep"; }
   std::string meaning() const override { return "tissue that has softened while the breast hung in the scanner"; }
+  EffectTraits traits() const override { return {.acts_in = ActsIn::imaged_only}; }
   const std::vector<Parameter>& parameters() const override;
-  bool needs_other_pose() const override { return true; }
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 };

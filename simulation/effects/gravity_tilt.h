@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 
@@ -11,8 +11,8 @@ class GravityTilt : public Effect {
  public:
   std::string name() const override { return "gravity_tilt"; }
   std::string meaning() const override { return "gravity of the measured poses points elsewhere than the case says"; }
+  EffectTraits traits() const override { return {.kind = EffectKind::measurement, .acts_in = ActsIn::all_but_imaged}; }
   const std::vector<Parameter>& parameters() const override;
-  bool needs_other_pose() const override { return true; }
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 };

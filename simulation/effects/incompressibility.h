@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 
@@ -10,6 +10,10 @@ class Incompressibility : public Effect {
  public:
   std::string name() const override { return "incompressibility"; }
   std::string meaning() const override { return "tissue nearer to, or further from, keeping its volume"; }
+  EffectTraits traits() const override { return {.kind = EffectKind::numerical, .error_source = "numerical"}; }
+  double tolerance(const std::string&, const MeasurementTolerances& known) const override {
+    return known.incompressibility;
+  }
   const std::vector<Parameter>& parameters() const override;
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 

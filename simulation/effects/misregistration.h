@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 
@@ -14,8 +14,17 @@ class Misregistration : public Effect {
  public:
   std::string name() const override { return "misregistration"; }
   std::string meaning() const override { return "scan that does not lie where the image says"; }
+  EffectTraits traits() const override {
+    return {.kind = EffectKind::measurement,
+            .acts_in = ActsIn::all_but_imaged,
+            .moves_scan = true,
+            .error_source = "registration",
+            .error_of_each_scan = true};
+  }
+  double tolerance(const std::string& unit, const MeasurementTolerances& known) const override {
+    return unit == "rad" ? known.registration_rad : known.registration_mm;
+  }
   const std::vector<Parameter>& parameters() const override;
-  bool needs_other_pose() const override { return true; }
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 };

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "segmentation/tissue.h"
-#include "simulation/catalogue.h"
+#include "simulation/effect.h"
 
 namespace supine::simulation {
 

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/error.h"
 #include "simulation/export/exported_pose.h"
@@ -55,21 +56,42 @@ void check_model(const Words& words, const Model& model) {
     refuse(words, "skin.law = \"corotational\"", "use \"neo_hookean\"");
 }
 
-void check_fields(const Words& words, const Model& model, const Fields<double>& fields, const std::string& pose) {
-  const auto any = [](const Eigen::VectorXd& column, double null) { return (column.array() != null).any(); };
-  const auto effect = [&](const char* name, const char* what) {
-    refuse(words, fmt::format("the effect {} ({})", name, what),
-           fmt::format("take it out: supine-model remove {} model.toml", name));
+using Column = Fields<double>::Column Fields<double>::*;
+
+bool any(const Eigen::VectorXd& column, double null) { return (column.array() != null).any(); }
+
+/// Names of the model's effects that by themselves take a column off @p null (not a number: make it vary).
+std::string effects_behind(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity, Column column,
+                           double null) {
+  std::string names;
+  for (const EffectSetting& effect : model.effects) {
+    Model alone = model;
+    alone.effects = {effect};
+    const auto fields = values_of(make_fields(alone, scene, gravity));
+    const Eigen::VectorXd& values = fields.*column;
+    if (any(values, std::isnan(null) ? values[0] : null)) names += (names.empty() ? "" : " ") + effect.name;
+  }
+  return names;
+}
+
+void check_fields(const Words& words, const Model& model, const Scene& scene, const Eigen::Vector3d& gravity) {
+  const auto fields = values_of(make_fields(model, scene, gravity));
+  const auto effect = [&](Column column, double null, const char* what) {
+    const std::string names = effects_behind(model, scene, gravity, column, null);
+    refuse(words, fmt::format("the effect {} ({})", names, what),
+           fmt::format("take it out: supine-model remove {} model.toml", names));
   };
-  if (any(fields.stiffening, 0)) effect("strain_stiffening", "exponential law of the tissue");
-  if (any(fields.fibre_modulus, 0)) effect("fibre_anisotropy", "fibres that carry tension only");
-  if (any(fields.skin_prestretch, 1)) effect("skin_prestretch", "a membrane under tension in the undeformed shape");
-  if (any(fields.skin_stiffening, 0)) effect("skin_stiffening", "exponential law of the skin");
+  if (any(fields.stiffening, 0)) effect(&Fields<double>::stiffening, 0, "exponential law of the tissue");
+  if (any(fields.fibre_modulus, 0)) effect(&Fields<double>::fibre_modulus, 0, "fibres that carry tension only");
+  if (any(fields.skin_prestretch, 1))
+    effect(&Fields<double>::skin_prestretch, 1, "a membrane under tension in the undeformed shape");
+  if (any(fields.skin_stiffening, 0)) effect(&Fields<double>::skin_stiffening, 0, "exponential law of the skin");
   if (model.interface.kind == InterfaceKind::sliding && any(fields.interface_friction, 0))
-    effect("friction", "slip counted from the undeformed shape");
+    effect(&Fields<double>::interface_friction, 0, "slip counted from the undeformed shape");
   if (!words.many_moduli && any(fields.ln_young, fields.ln_young[0]))
-    refuse(words, fmt::format("a neo_hookean breast whose modulus varies (pose {})", pose),
-           "use breast.law = \"corotational\", or take out gland_stiffness, tumour_stiffness and stiffness_gradient");
+    refuse(words, fmt::format("a neo_hookean breast whose modulus varies (pose {})", scene.pose),
+           "use breast.law = \"corotational\", or take out " +
+               effects_behind(model, scene, gravity, &Fields<double>::ln_young, std::nan("")));
 }
 
 }  // namespace
@@ -82,9 +104,7 @@ void check_exportable(Solver solver, const meshing::TetMesh& mesh, const meshing
            "mesh with supine-tetrahedralise --order 1");
   check_model(words, model);
   const Layout layout = make_layout(mesh, anatomy);
-  for (const PoseLoad& pose : poses)
-    check_fields(words, model, values_of(make_fields(model, {mesh, anatomy, layout, pose.name}, pose.gravity)),
-                 pose.name);
+  for (const PoseLoad& pose : poses) check_fields(words, model, {mesh, anatomy, layout, pose.name}, pose.gravity);
 }
 
 std::string export_extension(Solver solver) {

@@ -53,6 +53,46 @@ TEST_P(CatalogueTest, NullValuesLeaveEveryFieldBitForBit) {
     EXPECT_EQ(all_numbers(values_of(with(null, pose))), all_numbers(values_of(with({}, pose))));
 }
 
+TEST_P(CatalogueTest, ActsWhereAndOnWhatItsTraitsSay) {
+  const EffectTraits traits = GetParam()->traits();
+  std::vector<Dual> sizes;
+  for (const Parameter& row : GetParam()->parameters())
+    sizes.emplace_back(row.median != row.null ? row.median : row.null + 0.25 * (row.upper - row.null));
+  const auto changes = [&](const char* pose) {
+    return all_numbers(values_of(with(sizes, pose))) != all_numbers(values_of(with({}, pose)));
+  };
+  EXPECT_EQ(changes("prone"), traits.acts_in != ActsIn::all_but_imaged);
+  EXPECT_EQ(changes("supine"), traits.acts_in != ActsIn::imaged_only);
+  const auto moved = values_of(with(sizes)), as_it_was = values_of(with({}));
+  EXPECT_EQ(moved.scan_motion != as_it_was.scan_motion, traits.moves_scan);
+  if (traits.moves_scan)
+    for (const auto& [name, column] : field_columns<double>) {
+      const bool same = moved.*column == as_it_was.*column;
+      EXPECT_TRUE(same || std::string(name) == "scan_motion") << name;
+    }
+}
+
+TEST_P(CatalogueTest, StandsForAnErrorOfTheMeasurementWhereItSaysSo) {
+  const EffectTraits traits = GetParam()->traits();
+  bool tolerated = false;
+  for (const Parameter& row : GetParam()->parameters()) tolerated |= GetParam()->tolerance(row.unit, {}) > 0;
+  EXPECT_EQ(tolerated, !traits.error_source.empty());
+  EXPECT_EQ(GetParam()->tolerance({}, {}) > 0, tolerated);
+  if (traits.error_of_each_scan) {
+    EXPECT_TRUE(tolerated);
+  }
+}
+
+TEST(Catalogue, CausesOfMeasurementAndNumbersAreNoneOfTheBody) {
+  std::set<std::string> measurement;
+  for (const Effect* effect : catalogue())
+    if (is_measurement_effect(effect->name())) measurement.insert(effect->name());
+  EXPECT_EQ(measurement,
+            (std::set<std::string>{"misregistration", "gravity_tilt", "segmentation_offset", "incompressibility"}));
+  EXPECT_EQ(place_of_scan().name(), "misregistration");
+  EXPECT_FALSE(is_measurement_effect("nothing_of_that_name"));
+}
+
 TEST_P(CatalogueTest, EveryParameterHasTheDerivativeItStates) {
   const auto& rows = GetParam()->parameters();
   for (std::size_t p = 0; p < rows.size(); ++p) {

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <map>
 
+#include "simulation/catalogue.h"
 #include "simulation/export/exported_pose.h"
 #include "simulation/laws/skin_laws.h"
 #include "tests/pipeline/temporary_folder.h"
