@@ -129,12 +129,21 @@ def check_files(command, source):
     return None
 
 
+def anchors(page):
+    """Names that a link to a heading of the page may have."""
+    headings = re.findall(r"(?m)^#+ (.*)$", page.read_text())
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+
+
 def check_links(page):
     wrong = []
     for number, line in enumerate(page.read_text().splitlines(), 1):
-        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", line):
-            if not target.startswith("http") and not (page.parent / target).exists():
-                wrong.append(f"{page.name}:{number}: the link to {target} leads nowhere")
+        for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)]*))?\)", line):
+            if target.startswith("http"):
+                continue
+            goal = page.parent / target if target else page
+            if not goal.exists() or (anchor and anchor not in anchors(goal)):
+                wrong.append(f"{page.name}:{number}: the link to {target}{'#' + anchor if anchor else ''} leads nowhere")
     return wrong
 
 
