@@ -52,9 +52,7 @@ struct Stage {
   std::string pose;
 };
 
-/// Changes the fields of one pose. Written here once more, with regions and unevenness of its own, instead of taken
-/// from the catalogue: a diagnosis is not to be tested on its own assumptions.
-/// misregistration and segmentation_offset change no field: they act on the scan and on the labels.
+/// Changes the fields of one pose, as the cause's file in causes/ says; some act on the scan or on the labels instead.
 void apply_cause(const Cause& cause, const Stage& stage, simulation::Fields<double>& fields);
 
 }  // namespace supine::phantom

@@ -5,6 +5,7 @@
 
 #include "common/error.h"
 #include "meshing/topology.h"
+#include "phantom/causes/cause_kind.h"
 #include "phantom/voxels.h"
 
 namespace supine::phantom {
@@ -42,9 +43,10 @@ void solve_stiffening(const BodyMesh& body_mesh, Phantom& phantom) {
 }
 
 double grown_mm(const std::vector<Cause>& causes) {
+  double sum = 0;
   for (const Cause& cause : causes)
-    if (cause.name == "segmentation_offset") return -cause.values.at("offset_mm");
-  return 0;
+    if (const CauseKind& kind = cause_kind(cause.name); kind.labels_grown_mm) sum += kind.labels_grown_mm(cause);
+  return sum;
 }
 
 double volume_ml(const meshing::TetMesh& mesh) {

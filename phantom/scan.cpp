@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "phantom/causes/cause_kind.h"
 #include "phantom/face_grid.h"
 #include "phantom/random.h"
 #include "simulation/embedding.h"
@@ -21,7 +22,7 @@ struct Motion {
 
 std::optional<Motion> motion_of(const std::vector<Cause>& causes, const std::string& pose, std::uint64_t seed) {
   for (const Cause& given : causes) {
-    if (given.name != "misregistration") continue;
+    if (!cause_kind(given.name).moves_scan) continue;
     const Cause cause = pose == "supine" ? given : draw_cause(given.name, seed + 0x9e3779b9u);
     const auto v = [&cause](const char* name) { return cause.values.at(name); };
     return Motion{{v("shift_x_mm"), v("shift_y_mm"), v("shift_z_mm")},
