@@ -15,6 +15,7 @@
 
 #include "calibration/uncertainty.h"
 #include "common/error.h"
+#include "common/statistics.h"
 #include "meshing/mesh_io.h"
 #include "pipeline/case/case.h"
 #include "pipeline/case/model_file.h"
@@ -54,8 +55,8 @@ class Coverage {
       noisy.residuals.distance_mm = error + fit_.linearisation.slope * step;
       const auto worth = calibration::judge(noisy, parameters_, false);
       for (Eigen::Index p = 0; p < parameters; ++p) {
-        honest[p] += std::abs(step[p]) < 1.959964 * std::sqrt(worth.covariance(p, p));
-        naive[p] += std::abs(step[p]) < 1.959964 * std::sqrt(worth.white(p, p));
+        honest[p] += std::abs(step[p]) < normal_reach95() * std::sqrt(worth.covariance(p, p));
+        naive[p] += std::abs(step[p]) < normal_reach95() * std::sqrt(worth.white(p, p));
       }
     }
     for (Eigen::Index p = 0; p < parameters; ++p) {

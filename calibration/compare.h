@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "calibration/distance_figures.h"
 #include "calibration/model_skin.h"
 #include "calibration/scan.h"
 #include "calibration/signed_distance.h"
-#include "calibration/statistics.h"
 #include "common/landmarks.h"
 
 namespace supine::calibration {

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "calibration/distance_figures.h"
 #include "calibration/free_parameters.h"
 #include "calibration/model_skin.h"
 #include "calibration/scan.h"
 #include "calibration/scan_motion.h"
 #include "calibration/signed_distance.h"
-#include "calibration/statistics.h"
 #include "simulation/solve/chain.h"
 #include "simulation/solve/sensitivities.h"
 

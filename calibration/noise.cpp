@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "calibration/neighbour_search.h"
-#include "calibration/statistics.h"
 #include "common/error.h"
+#include "common/statistics.h"
 
 namespace supine::calibration {
 namespace {
@@ -65,7 +65,7 @@ double estimate_noise_mm(const Points& place, const Eigen::VectorXd& distance_mm
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < deviation.size(); ++i)
     deviation[i] = std::abs(standardised_deviation(search, distance_mm, static_cast<Eigen::Index>(i) * stride));
-  return mad_to_sigma * percentile(deviation, 0.5);
+  return mad_to_sigma * quantile(deviation, 0.5);
 }
 
 std::vector<int> points_that_stand_out(const Points& place, const Eigen::VectorXd& distance_mm, double noise_mm,

@@ -3,11 +3,12 @@
 
 #include "calibration/uncertainty.h"
 #include "common/error.h"
+#include "common/statistics.h"
 
 namespace supine::calibration {
 namespace {
 
-constexpr double rise_95 = 3.841459;  // χ² with one degree of freedom
+const double rise_95 = chi_squared_quantile(1, 0.95);
 constexpr int most_refits = 3;        // per end
 constexpr double close_enough = 0.1;  // of the distance in the square root of the rise
 

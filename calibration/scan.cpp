@@ -8,9 +8,9 @@
 #include <cmath>
 #include <vector>
 
-#include "calibration/statistics.h"
 #include "calibration/surface_topology.h"
 #include "common/error.h"
+#include "common/statistics.h"
 
 namespace supine::calibration {
 namespace {
@@ -102,10 +102,6 @@ SurfaceDistance prepared(const reconstruction::Surface& surface, const ModelSkin
   const auto piece = orient_pieces(SurfaceTopology(used.points, used.triangles), used.triangles);
   turn_outward(piece, used.points, model, used.triangles);
   return {used.points, used.triangles};
-}
-
-double median(const Eigen::VectorXd& values) {
-  return percentile(std::vector<double>(values.data(), values.data() + values.size()), 0.5);
 }
 
 Points flipped(const Points& points) { return points * Eigen::Vector3d(-1, -1, 1).asDiagonal(); }

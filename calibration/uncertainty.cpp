@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "common/rms.h"
+#include "common/statistics.h"
 
 namespace supine::calibration {
 namespace {
 
 constexpr double told_apart = 0.95;
 constexpr double open_sd = 1e3;
-constexpr double quantile = 1.959964;
 
 /// Information with a little added where there is none: along such a direction the variance becomes open_sd².
 struct Closed {
@@ -64,7 +64,7 @@ std::vector<Interval> linear_intervals(const Fit& fit, const FreeParameters& par
                                        const Uncertainty& uncertainty) {
   std::vector<Interval> intervals;
   for (Eigen::Index i = 0; i < parameters.size(); ++i) {
-    const double reach = quantile * std::sqrt(uncertainty.covariance(i, i));
+    const double reach = normal_reach95() * std::sqrt(uncertainty.covariance(i, i));
     intervals.push_back({parameters.value(i, std::max(fit.u[i] - reach, parameters.lower()[i])),
                          parameters.value(i, std::min(fit.u[i] + reach, parameters.upper()[i]))});
   }

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <optional>
 
-#include "diagnosis/chi_squared.h"
+#include "common/statistics.h"
 #include "simulation/catalogue.h"
 
 namespace supine::diagnosis {
@@ -191,12 +191,6 @@ Eigen::MatrixXd smooth_shapes(const calibration::Residuals& residuals) {
   return shapes;
 }
 
-Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& columns) {
-  if (columns.cols() == 0) return columns;
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), qr.rank());
-}
-
 }  // namespace
 
 std::string verdict_name(Verdict verdict) {
@@ -216,10 +210,10 @@ std::string verdict_name(Verdict verdict) {
 LackOfFit lack_of_fit(const WeightedFit& fit, const Metric& metric) {
   const calibration::Fit& f = fit.fit;
   const Eigen::VectorXd white = metric.whitening->apply(f.residuals.distance_mm + metric.mean_mm);
-  const Eigen::MatrixXd absorbed = orthonormal(metric.whitening->apply(f.linearisation.slope));
+  const Eigen::MatrixXd absorbed = orthonormal_basis(metric.whitening->apply(f.linearisation.slope));
   Eigen::MatrixXd shapes = metric.whitening->apply(smooth_shapes(f.residuals));
   shapes -= absorbed * (absorbed.transpose() * shapes);
-  const Eigen::MatrixXd free = orthonormal(shapes);
+  const Eigen::MatrixXd free = orthonormal_basis(shapes);
   LackOfFit left;
   left.misfit = white.squaredNorm() / static_cast<double>(white.size() - absorbed.cols());
   left.p_value = chi_squared_above(static_cast<int>(free.cols()), (free.transpose() * white).squaredNorm());

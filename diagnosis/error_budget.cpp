@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/rms.h"
+#include "common/statistics.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -15,7 +16,7 @@ class LeftByFit {
  public:
   LeftByFit(const Eigen::MatrixXd& slope, const Whitening& whitening)
       : slope_(slope), white_(whitening.apply(slope)), whitening_(whitening) {
-    covariance_ = (white_.transpose() * white_).completeOrthogonalDecomposition().pseudoInverse();
+    covariance_ = covariance_of(white_.transpose() * white_);
   }
 
   double mean_square_of(const Eigen::VectorXd& field) const {

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "common/error.h"
+#include "common/statistics.h"
 #include "diagnosis/diagnose.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
@@ -16,8 +17,7 @@ namespace {
 
 using calibration::FreeParameters;
 
-constexpr double level = 3.841459;  // of χ² with one degree of freedom, 95 %
-constexpr int trials = 3;           // values tried on each side
+constexpr int trials = 3;  // values tried on each side
 constexpr double near_enough = 0.2;
 
 /// Sources and whitening without the tolerance for the effect, the mesh's error at the model with it.
@@ -42,8 +42,7 @@ Errors errors_with(const calibration::MeasuredScene& scene, const ErrorSources& 
 
 /// The interval widened by an error of @p sd of the value, in quadrature on each side, cut at the range.
 void widen(double sd, FittedParameter& p) {
-  constexpr double quantile = 1.959964;
-  const double more = quantile * sd;
+  const double more = normal_reach95() * sd;
   const simulation::Parameter& row = *simulation::find_parameter(p.name);
   p.low = std::max(row.lower, p.value - std::hypot(p.value - p.low, more));
   p.high = std::min(row.upper, p.value + std::hypot(p.high - p.value, more));
@@ -126,9 +125,9 @@ FittedParameter profiled(const calibration::MeasuredScene& scene, const Metric& 
                          const FreeParameters& parameters, const WeightedFit& least, Eigen::Index i,
                          const FittedParameter& linear) {
   const Profile profile(scene, metric, parameters, least, i);
-  const double u = least.fit.u[i], height = level * std::max(1.0, misfit_of(least, parameters, metric));
-  const double variance =
-      information(least, parameters, metric).completeOrthogonalDecomposition().pseudoInverse()(i, i);
+  const double u = least.fit.u[i];
+  const double height = chi_squared_quantile(1, 0.95) * std::max(1.0, misfit_of(least, parameters, metric));
+  const double variance = covariance_of(information(least, parameters, metric))(i, i);
   const double reach = std::sqrt(height * variance);
   FittedParameter result = linear;
   double ends[2] = {-reach, reach};

@@ -7,6 +7,7 @@
 
 #include "common/error.h"
 #include "common/rms.h"
+#include "common/statistics.h"
 #include "diagnosis/candidates.h"
 #include "diagnosis/left_out_pose.h"
 #include "simulation/catalogue.h"
@@ -117,8 +118,7 @@ void set_errors(calibration::Evaluator& evaluator, const FreeParameters& paramet
   const simulation::Sensitivities sensitivities(evaluator.chain(), model, prediction.solution);
   const Eigen::MatrixXd slope =
       calibration::linearise(evaluator, sensitivities, parameters, fit.fit.u, prediction, seen.residuals).slope;
-  const Eigen::MatrixXd covariance =
-      information(fit, parameters, metric).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd covariance = covariance_of(information(fit, parameters, metric));
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
   const Eigen::MatrixXd shapes = slope * axes.eigenvectors() * axes.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
   for (Eigen::Index i = 0; i < shapes.cols(); ++i) errors.modes.push_back({"parameters", shapes.col(i)});

@@ -10,6 +10,7 @@
 #include "calibration/held_out.h"
 #include "common/error.h"
 #include "common/rms.h"
+#include "common/statistics.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
@@ -136,8 +137,7 @@ double occam(const Job& job) {
     const auto k = static_cast<std::size_t>(i);
     return priors[k] && job.parameters->names()[k].rfind(job.effect + ".", 0) == 0;
   };
-  const Eigen::MatrixXd covariance =
-      information(job.fit, *job.parameters, job.metric).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd covariance = covariance_of(information(job.fit, *job.parameters, job.metric));
   std::vector<int> rows;
   double prior = 0;
   for (int i = 0; i < static_cast<int>(job.parameters->size()); ++i)
@@ -220,15 +220,13 @@ simulation::EffectSetting free_setting(const std::string& name) {
 
 std::vector<FittedParameter> linear_intervals(const std::string& effect, const WeightedFit& fit,
                                               const FreeParameters& parameters, const Metric& metric) {
-  constexpr double quantile = 1.959964;
-  const Eigen::MatrixXd covariance =
-      information(fit, parameters, metric).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd covariance = covariance_of(information(fit, parameters, metric));
   const double wider = std::sqrt(std::max(1.0, misfit_of(fit, parameters, metric)));
   std::vector<FittedParameter> list;
   for (Eigen::Index i = 0; i < parameters.size(); ++i) {
     const std::string& name = parameters.names()[static_cast<std::size_t>(i)];
     if (name.rfind(effect + ".", 0) != 0) continue;
-    const double reach = wider * quantile * std::sqrt(covariance(i, i)), u = fit.fit.u[i];
+    const double reach = wider * normal_reach95() * std::sqrt(covariance(i, i)), u = fit.fit.u[i];
     list.push_back({name, parameters.unit(i), parameters.value(i, u),
                     parameters.value(i, std::max(u - reach, parameters.lower()[i])),
                     parameters.value(i, std::min(u + reach, parameters.upper()[i]))});

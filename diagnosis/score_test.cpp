@@ -8,7 +8,7 @@
 
 #include "calibration/held_out.h"
 #include "common/rms.h"
-#include "diagnosis/chi_squared.h"
+#include "common/statistics.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -19,13 +19,6 @@ constexpr double same_direction = 0.9;
 constexpr double implausible = 3;
 constexpr int null_draws = 1000;
 constexpr double chance = 0.05;
-
-/// Orthonormal basis of the column space.
-Eigen::MatrixXd basis(const Eigen::MatrixXd& columns) {
-  if (columns.cols() == 0) return columns;
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(columns, Eigen::ComputeThinU);
-  return svd.matrixU().leftCols(svd.rank());
-}
 
 /// A candidate in whitened space, freed of what recalibration can absorb.
 struct Projected {
@@ -45,7 +38,7 @@ class Scorer {
         slope_(slope),
         candidates_(candidates),
         log_points_(std::log(whitening.effective_points())) {
-    const Eigen::MatrixXd absorbed = basis(whitening.apply(slope));
+    const Eigen::MatrixXd absorbed = orthonormal_basis(whitening.apply(slope));
     const auto freed = [&absorbed](const Eigen::MatrixXd& a) -> Eigen::MatrixXd {
       return a - absorbed * (absorbed.transpose() * a);
     };
@@ -57,7 +50,7 @@ class Scorer {
         p.secant_square = p.secant.squaredNorm();
         p.secant.normalize();
       }
-      p.direction = basis(p.slope);
+      p.direction = orthonormal_basis(p.slope);
       p.one_sided = candidate.parameters.size() == 1 && candidate.parameters[0].one_sided;
       projected_.push_back(std::move(p));
     }

@@ -7,6 +7,7 @@
 #include "calibration/evaluator_pool.h"
 #include "calibration/monte_carlo.h"
 #include "common/error.h"
+#include "common/statistics.h"
 #include "pipeline/case/journal_key.h"
 #include "pipeline/case/measured_case.h"
 #include "pipeline/picture/picture.h"
@@ -137,13 +138,12 @@ class SensitivityTool : public Tool {
     f["failed_solves"] = failed;
     f["mae_study_mm"] = {{"mean", m.mean()}, {"sd", sd}, {"min", m.minCoeff()}, {"max", m.maxCoeff()}};
     f["quantiles"] = Json::array();
-    for (const double q : quantiles)
-      f["quantiles"].push_back({{"share", q}, {"mae_study_mm", calibration::percentile(mae, q)}});
+    for (const double q : quantiles) f["quantiles"].push_back({{"share", q}, {"mae_study_mm", quantile(mae, q)}});
     f["parameters"] = Json::array();
     for (Eigen::Index p = 0; p < parameters.size(); ++p)
       f["parameters"].push_back({{"name", parameters.names()[static_cast<std::size_t>(p)]},
                                  {"unit", parameters.unit(p)},
-                                 {"median", calibration::percentile({values.col(p).begin(), values.col(p).end()}, 0.5)},
+                                 {"median", quantile({values.col(p).begin(), values.col(p).end()}, 0.5)},
                                  {"variance_share", shares[p]}});
     f["interaction_share"] = std::max(0.0, 1 - shares.sum());
     if (!png_.empty())
@@ -151,9 +151,7 @@ class SensitivityTool : public Tool {
           {fmt::format("{}: {} draws, {} without equilibrium", measured_->description.name, samples_, failed),
            "MAE model to scan, mm",
            mae,
-           {{"5 %", calibration::percentile(mae, 0.05)},
-            {"median", calibration::percentile(mae, 0.5)},
-            {"95 %", calibration::percentile(mae, 0.95)}}},
+           {{"5 %", quantile(mae, 0.05)}, {"median", quantile(mae, 0.5)}, {"95 %", quantile(mae, 0.95)}}},
           run.output(png_));
     say(run, parameters, mae, {m.mean(), sd}, shares, failed);
   }
@@ -163,8 +161,7 @@ class SensitivityTool : public Tool {
     run.say(fmt::format("  {} chain runs, {} without equilibrium", samples_, failed));
     run.say(fmt::format(
         "  MAE model to scan (study): {:.2f} ± {:.2f} mm (mean, sd); 5 % {:.2f}, median {:.2f}, 95 % {:.2f}",
-        mean_and_sd.first, mean_and_sd.second, calibration::percentile(mae, 0.05), calibration::percentile(mae, 0.5),
-        calibration::percentile(mae, 0.95)));
+        mean_and_sd.first, mean_and_sd.second, quantile(mae, 0.05), quantile(mae, 0.5), quantile(mae, 0.95)));
     for (Eigen::Index p = 0; p < shares.size(); ++p)
       run.say(fmt::format("  {:>5.1f} % of the variance from {}", 100 * shares[p],
                           parameters.names()[static_cast<std::size_t>(p)]));

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/statistics.h"
 #include "diagnosis/diagnosis_file.h"
 
 namespace supine::pipeline {
@@ -41,7 +42,6 @@ std::vector<std::string> rivals_of(const Findings& found, const std::string& eff
 
 /// Of the refit where there is one, else of the linear step.
 Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, const Refit* refit) {
-  constexpr double quantile = 1.959964;
   Json list = Json::array();
   if (refit != nullptr) {
     for (const auto& p : refit->parameters)
@@ -50,7 +50,7 @@ Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, 
   }
   for (Eigen::Index k = 0; k < score.step.size(); ++k) {
     const auto& p = candidate.parameters[static_cast<std::size_t>(k)];
-    const double reach = quantile * score.step_sd[k];
+    const double reach = normal_reach95() * score.step_sd[k];
     list.push_back({{"name", p.name},
                     {"value", score.step[k]},
                     {"unit", p.unit},

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "calibration/statistics.h"
 #include "common/error.h"
+#include "common/statistics.h"
 
 namespace supine::calibration {
 namespace {
@@ -30,7 +30,7 @@ TEST(MonteCarlo, PriorDrawsArePositiveAndLogNormal) {
     square += logs.back() * logs.back();
   }
   const double sd = std::log(1 + 0.4 / 0.32);
-  EXPECT_NEAR(percentile(logs, 0.5), 0, 5 * 1.2533 * sd / std::sqrt(4000.0));  // of the median, 5 sigma
+  EXPECT_NEAR(quantile(logs, 0.5), 0, 5 * 1.2533 * sd / std::sqrt(4000.0));  // of the median, 5 sigma
   EXPECT_NEAR(std::sqrt(square / 4000), sd, 5 * sd / std::sqrt(8000.0));
 }
 

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "common/error.h"
-#include "diagnosis/chi_squared.h"
+#include "common/statistics.h"
 #include "diagnosis/examine.h"
 #include "tests/diagnosis/sheet.h"
 

@@ -5,11 +5,6 @@
 
 namespace supine::calibration {
 
-/// Value below which the share @p p of @p values lies, linear between neighbouring order statistics: of n sorted
-/// values the one at place p (n − 1). NaN without values.
-/// @param p  in [0, 1]
-double percentile(std::vector<double> values, double p);
-
 /// Figures of signed distances, mm. All NaN without values.
 struct DistanceFigures {
   double mae_mm;  ///< mean |d|
