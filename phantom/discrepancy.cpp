@@ -88,11 +88,11 @@ struct Bumps {
   }
 };
 
-/// The answer of a pose to forces.
+/// What forces move a body by in a pose.
 class Response {
  public:
   Response(const simulation::Mechanics& mechanics, const Points& rest, const TruthPose& pose)
-      : sums_(mechanics.pattern()), solver_(sums_.tangent), skin_(mechanics.mesh(), Region::skin, pose.x) {
+      : sums_(mechanics.pattern()), solver_(sums_.tangent) {
     mechanics.evaluate({pose.x, rest, 1.0}, {.energy = false, .tangent = true}, sums_);
     if (!solver_.factorise(sums_.tangent))
       throw NumericalFailure("the tangent of the phantom is singular in " + pose.name + "; take another seed");
@@ -103,22 +103,22 @@ class Response {
     return Eigen::Map<const Points>(moved.data(), moved.size() / 3, 3);
   }
 
-  /// Mean square along the normal over the skin.
-  double mean_square(const Points& moved) const {
-    Eigen::VectorXd along(skin_.faces.rows());
-    for (Eigen::Index f = 0; f < along.size(); ++f) {
-      Eigen::RowVector3d mean = Eigen::RowVector3d::Zero();
-      for (int a = 0; a < 3; ++a) mean += moved.row(skin_.faces(f, a)) / 3;
-      along[f] = mean.dot(skin_.normal.row(f));
-    }
-    return skin_.area.dot(along.cwiseAbs2()) / skin_.area.sum();
-  }
-
  private:
   simulation::Sums sums_;
   simulation::LuSolver solver_;
-  Patchwork skin_;
 };
+
+/// How far the middles of the faces move along their normals.
+Eigen::VectorXd along_normal(const Patchwork& surface, const Points& moved) {
+  Eigen::VectorXd along = Eigen::VectorXd::Zero(surface.faces.rows());
+  for (Eigen::Index f = 0; f < along.size(); ++f)
+    for (int a = 0; a < 3; ++a) along[f] += moved.row(surface.faces(f, a)).dot(surface.normal.row(f)) / 3;
+  return along;
+}
+
+double mean_square(const Patchwork& surface, const Eigen::VectorXd& values) {
+  return surface.area.dot(values.cwiseAbs2()) / surface.area.sum();
+}
 
 double scale_mm(const std::vector<TruthPose>& poses) {
   const Points way = poses[1].x - poses[0].x;
@@ -145,18 +145,24 @@ Discrepancy::Discrepancy(Truth& truth, const BodyMesh& body_mesh, const std::vec
     inner.add(seed, {"forces within " + draw, "forces within " + draw + pose}, force);
     return force;
   };
-  double mean_square = 0;
+  double variance = 0;
   for (std::size_t p = 1; p < poses.size(); ++p) {
     const Response response(truth.in(poses[p]), body_mesh.mesh.points, poses[p]);
-    for (int k = 0; k < draws_for_scale; ++k)
-      mean_square += response.mean_square(response.to(forces("for scale " + std::to_string(k), poses[p].name)));
+    const Patchwork surface(body_mesh.mesh, Region::skin, poses[p].x);
+    for (int k = 0; k < draws_for_scale; ++k) {
+      const Points moved = response.to(forces("for scale " + std::to_string(k), poses[p].name));
+      variance += mean_square(surface, along_normal(surface, moved)) / draws_for_scale;
+    }
     displacement_[poses[p].name] = response.to(forces("", poses[p].name));
-    rms_mm_[poses[p].name] = std::sqrt(response.mean_square(displacement_[poses[p].name]));
   }
-  mean_square /= static_cast<double>(draws_for_scale * (poses.size() - 1));
-  const double scale = size_mm_ * std::sqrt((1 - share_beyond_forces) / mean_square);
-  for (auto& [pose, moved] : displacement_) moved *= scale;
-  for (auto& [pose, rms] : rms_mm_) rms *= scale;
+  variance /= static_cast<double>(poses.size() - 1);
+  for (std::size_t p = 1; p < poses.size(); ++p) {
+    const std::string& name = poses[p].name;
+    displacement_[name] *= size_mm_ * std::sqrt((1 - share_beyond_forces) / variance);
+    const Patchwork surface(body_mesh.mesh, Region::skin, poses[p].x);
+    rms_mm_[name] = std::sqrt(
+        mean_square(surface, along_normal(surface, displacement_[name]) + beyond_forces(name).over(surface.middle)));
+  }
 }
 
 RandomField Discrepancy::beyond_forces(const std::string& pose) const {

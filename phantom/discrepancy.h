@@ -31,7 +31,7 @@ class Discrepancy {
   const Points& displacement(const std::string& pose) const { return displacement_.at(pose); }
   /// The rest, mm along the skin's normal by the place in the pose.
   RandomField beyond_forces(const std::string& pose) const;
-  /// RMS along the normal over the pose's skin of what the forces move.
+  /// RMS of both along the normal over the pose's skin.
   double rms_mm(const std::string& pose) const { return rms_mm_.at(pose); }
 
  private:
