@@ -8,7 +8,8 @@
 #   make build                       only build, into $(BUILD); make tools: without tests and measurements
 #   make bench [DATA=dir]            every measurement of docs/verification.md and docs/performance.md: hours, on a quiet machine
 #   make study [DATA=dir]            every table of docs/study.md: an hour or more, on a quiet machine
-#   make hidden N=60 [SEED=1]        N cases with a sealed answer, each diagnosed from its folder alone; confusion matrix
+#   make hidden [N=60] [SEED=1]      N cases with a sealed answer, each diagnosed from its folder alone; confusion matrix
+#        [REALISTIC=1] [PRIOR=1] [SET=pairs|foreign|doses] [QUARTER=1..4] [SEED_FROM=tag] [ROWS=file]: docs/hidden.md
 
 SHELL := /bin/bash
 BUILD ?= build
@@ -78,10 +79,11 @@ bench: build
 	@bench/run_all.sh $(DATA) $(BUILD)/bench $(BUILD)/bin
 
 # Goes on where an earlier call stopped; docs/hidden.md.
-N ?= 60
-SEED ?= 1
+hidden_seed := $(if $(SEED_FROM),--seed-from $(SEED_FROM),$(if $(SEED),--seed $(SEED)))
+hidden_work := $(BUILD)/hidden$(if $(PRIOR),-prior)$(if $(SET),-$(SET))$(if $(REALISTIC),-realistic)-$(or $(SEED_FROM),$(SEED),1)
 hidden: build
-	@bench/hidden.py $(BUILD)/hidden-$(SEED) --bin $(BUILD)/bin --cases $(N) --seed $(SEED) $(HIDDEN)
+	@bench/hidden.py $(hidden_work) --bin $(BUILD)/bin $(hidden_seed) $(if $(N),--cases $(N)) $(if $(PRIOR),--prior) \
+	  $(if $(REALISTIC),--realistic) $(if $(SET),--set $(SET)) $(if $(QUARTER),--quarter $(QUARTER)) $(if $(ROWS),--rows $(ROWS)) $(HIDDEN)
 
 clean:
 	rm -rf $(BUILD)

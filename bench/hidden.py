@@ -2,71 +2,34 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Blind benchmark: makes cases with a sealed answer, diagnoses each from its case folder alone, scores.
 
-    bench/hidden.py WORK --bin build/bin --cases 60 [--first 1] [--seed 1] [--jobs 2] [--no-tilt] [--only odd|even]
-                    [--again]
+    bench/hidden.py WORK --bin build/bin [--realistic | --prior | --set pairs|foreign|doses [--realistic]]
+                    [--cases N] [--seed N | --seed-from TAG] [--quarter 1..4] [--rows FILE] [--first 1] [--jobs 2]
+                    [--no-tilt] [--only odd|even] [--again [--label LABEL]]
 
 WORK/cases/case-001 ... what the tools read; WORK/answers/case-001.json the answers; WORK/out/case-001 what the tools
-wrote. A second call goes on where the first stopped. --again diagnoses the cases that are there once more into
-WORK/out-LABEL (--label LABEL), with mesh and calibration as they are; with --no-tilt from WORK/cases-no-tilt, the same
-cases without their tilted scan. Standard library only.
+wrote. What is scored of a case is a row of WORK/rows.jsonl (--rows), written as soon as the case is done. A call goes
+on from the rows that are there, so that the file alone takes a run to another machine. --again diagnoses the cases that
+are there once more into WORK/out-LABEL (--label LABEL), with mesh and calibration as they are; with --no-tilt from
+WORK/cases-no-tilt, the same cases without their tilted scan. Standard library only.
 """
 
 import argparse
 import concurrent.futures
+import hashlib
 import json
 import os
 import pathlib
-import random
 import re
 import shutil
 import subprocess
 import sys
 
 sys.dont_write_bytecode = True  # nothing is left in the source tree
+import hidden_case  # noqa: E402
+import hidden_plan  # noqa: E402
 import hidden_score  # noqa: E402
 
 HERE = pathlib.Path(__file__).resolve().parent
-EFFECTS = ["adhesion", "ligament", "friction", "strain_stiffening", "fibre_anisotropy", "incompressibility",
-           "gland_stiffness", "tumour_stiffness", "stiffness_gradient", "skin_prestretch", "skin_stiffening", "creep",
-           "arm_traction", "chest_wall_motion", "gravity_tilt", "misregistration", "segmentation_offset"]
-OUTSIDE = ["coil_contact", "scar", "skin_gradient"]
-# One hand of the mixture: as many nulls as single effects, some with two, some from outside the catalogue.
-KINDS = ["effect"] * 5 + ["null"] * 5 + ["two", "outside"]
-
-
-def deck(cards, seed, name, count):
-    """The first `count` cards of shuffled decks laid one after the other: every prefix is close to balanced."""
-    drawn, number = [], 0
-    while len(drawn) < count:
-        hand = list(cards)
-        random.Random(f"{seed} {name} {number}").shuffle(hand)
-        drawn += hand
-        number += 1
-    return drawn[:count]
-
-
-def plan(count, seed):
-    """The options of supine-phantom for each case."""
-    kinds = deck(KINDS, seed, "kind", count)
-    singles = iter(deck(EFFECTS, seed, "single", count))
-    pairs = iter(deck(EFFECTS, seed, "pair", 2 * count))
-    others = iter(deck(OUTSIDE, seed, "outside", count))
-    cases = []
-    for number, kind in enumerate(kinds, 1):
-        options = ["--seed", str(1000 * seed + number)]
-        if kind == "effect":
-            options += ["--effect", next(singles)]
-        elif kind == "two":
-            first, second = next(pairs), next(pairs)
-            while second == first:
-                second = next(pairs)
-            options += ["--effect", first, "--effect", second]
-        elif kind == "outside":
-            options += ["--outside", next(others)]
-        else:
-            options += ["--effect", "null"]
-        cases.append((f"case-{number:03d}", options))
-    return cases
 
 
 def run(command, log):
@@ -143,55 +106,140 @@ def diagnose_again(work, binaries, name, label, tilt=True):
 
 
 def one_case(work, options, name, words):
+    """The row of the case, or None where there is no result."""
+    out = work / (f"out-{options.label}" if options.again else "out")
     if options.again:
         diagnose_again(work, options.bin, name, options.label, not options.no_tilt)
-        return name
-    words = words + ([] if options.no_tilt else ["--tilt"])
-    made, seconds = make_case(work, options.bin, name, words)
-    if made:
-        (work / "out" / name).mkdir(parents=True, exist_ok=True)
-        if seconds:
-            note_seconds(work / "out" / name, {"phantom": seconds})
-        diagnose_case(work, options.bin, name)
-    return name
+    else:
+        words = words + ([] if options.no_tilt else ["--tilt"])
+        made, seconds = make_case(work, options.bin, name, words)
+        if made:
+            (out / name).mkdir(parents=True, exist_ok=True)
+            if seconds:
+                note_seconds(out / name, {"phantom": seconds})
+            diagnose_case(work, options.bin, name)
+    answer = work / "answers" / f"{name}.json"
+    return hidden_case.read_case(answer, out) if answer.exists() else None
 
 
-def arguments():
+def program(binaries):
+    """Version and commit that supine-diagnose was built from, as it says."""
+    said = subprocess.run([binaries / "supine-diagnose", "--version"], capture_output=True, text=True, check=False)
+    found = re.match(r"\S+ (\S+) \((\S+)\)", said.stdout)
+    return {"version": found[1], "commit": found[2]} if said.returncode == 0 and found else {}
+
+
+class Rows:
+    """What has been scored, one line of JSON a case; appended to, never written anew."""
+
+    def __init__(self, file):
+        self.file = file
+        self.known = {hidden_score.key_of(row) for row in self.read()}
+
+    def read(self):
+        return hidden_score.scored_before([self.file]) if self.file.exists() else []
+
+    def add(self, row):
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        with open(self.file, "a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+        self.known.add(hidden_score.key_of(row))
+
+
+def seed_from(tag):
+    """A seed that nobody has chosen: the hash of the commit that the tag stands at."""
+    found = subprocess.run(["git", "-C", HERE, "rev-parse", "--verify", "--quiet", f"refs/tags/{tag}^{{commit}}"],
+                           capture_output=True, text=True, check=False)
+    if found.returncode != 0:
+        raise SystemExit(f"--seed-from {tag}: there is no such tag")
+    return int.from_bytes(hashlib.sha256(found.stdout.strip().encode()).digest()[:5], "big")
+
+
+def parser():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("work", type=pathlib.Path)
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/bin"))
-    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--realistic", action="store_true", help="with what patients bring; also with --set")
+    parser.add_argument("--prior", action="store_true", help="cases from the priors")
+    parser.add_argument("--set", choices=["pairs", "foreign", "doses"], help="a designed set")
+    parser.add_argument("--cases", type=int, help="default: as many as the set has, 60 of a mixture")
     parser.add_argument("--first", type=int, default=1, help="number of the first case to run, up to --cases")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--quarter", type=int, choices=[1, 2, 3, 4], help="every fourth case alone")
+    parser.add_argument("--seed", type=int, help="default 1")
+    parser.add_argument("--seed-from", metavar="TAG", help="the seed is a hash of this tag's commit")
+    parser.add_argument("--rows", type=pathlib.Path, help="default WORK/rows.jsonl")
     parser.add_argument("--jobs", type=int, default=2, help="cases side by side, one thread each")
     parser.add_argument("--no-tilt", action="store_true", help="the supine scan alone")
     parser.add_argument("--only", choices=["odd", "even"], help="cases with such a seed")
     parser.add_argument("--again", action="store_true", help="diagnose once more, into WORK/out-LABEL")
     parser.add_argument("--label", default="again")
-    return parser.parse_args()
+    return parser
 
 
-def main():
-    options = arguments()
-    if options.first < 1:
-        raise SystemExit(f"--first {options.first}: cases are counted from 1")
-    work = options.work.resolve()
-    options.bin = options.bin.resolve()
-    for folder in ("cases", "answers", "out", "logs"):
-        (work / folder).mkdir(parents=True, exist_ok=True)
-    cases = [(name, words) for name, words in plan(options.cases, options.seed)[options.first - 1:]
-             if options.only is None or int(words[1]) % 2 == (options.only == "odd")]
+def arguments(words=None):
+    options = parser().parse_args(words)
+    for both, what in ((options.prior and options.set, "--prior excludes --set: it draws the effects itself"),
+                       (options.prior and options.realistic,
+                        "--prior excludes --realistic: each says how nuisances are drawn"),
+                       (options.seed is not None and options.seed_from, "--seed excludes --seed-from"),
+                       (options.first < 1, f"--first {options.first}: cases are counted from 1")):
+        if both:
+            raise SystemExit(what)
+    name = "prior" if options.prior else options.set or ("realistic" if options.realistic else "mixture")
+    options.name = f"{name}-realistic" if options.set and options.realistic else name
+    options.cases = options.cases or hidden_plan.SETS[name][0]
+    options.seed = seed_from(options.seed_from) if options.seed_from else options.seed or 1
+    options.planned = hidden_plan.plan(name, options.cases, options.seed, options.realistic)
+    return options
+
+
+def wanted(options):
+    cases = options.planned[options.first - 1:]
+    if options.quarter:
+        cases = hidden_plan.quarter(cases, options.quarter)
+    return [(name, words) for name, words in cases
+            if options.only is None or int(words[1]) % 2 == (options.only == "odd")]
+
+
+def run_all(work, options, rows, cases):
+    """@return names of those without a result"""
+    stamp = {"set": options.name, **program(options.bin)}
+    empty = []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        waiting = [pool.submit(one_case, work, options, name, words) for name, words in cases]
+        waiting = {pool.submit(one_case, work, options, name, words): name for name, words in cases}
         try:
             for number, done in enumerate(concurrent.futures.as_completed(waiting), 1):
-                print(f"{done.result()} done, {number} of {len(cases)}", file=sys.stderr, flush=True)
+                row = done.result()
+                if row is None:
+                    empty.append(waiting[done])
+                else:
+                    rows.add(row | stamp)
+                print(f"{waiting[done]} done, {number} of {len(cases)}", file=sys.stderr, flush=True)
         except KeyboardInterrupt:
             pool.shutdown(wait=True, cancel_futures=True)  # the tools have had the signal as well and end by themselves
             print("Stopped; the same command goes on from here.", file=sys.stderr)
             raise SystemExit(130)
-    out = work / (f"out-{options.label}" if options.again else "out")
-    hidden_score.report(work / "answers", out, out.with_name(out.name.replace("out", "score", 1)))
+    return empty
+
+
+def main():
+    options = arguments()
+    work = options.work.resolve()
+    options.bin = options.bin.resolve()
+    for folder in ("cases", "answers", "out", "logs"):
+        (work / folder).mkdir(parents=True, exist_ok=True)
+    score = f"score-{options.label}" if options.again else "score"
+    rows = Rows(options.rows or work / f"{score.replace('score', 'rows')}.jsonl")
+    cases = [(name, words) for name, words in wanted(options)
+             if (options.name, int(words[1]), name) not in rows.known]
+    empty = run_all(work, options, rows, cases)
+    if empty:
+        print(f"No result, see {work / 'logs'}: {', '.join(sorted(empty))}", file=sys.stderr)
+    if not rows.known:
+        raise SystemExit("no case has a result")
+    hidden_score.tell(rows.read(), work / score)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 #include "common/landmarks.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -35,40 +36,58 @@ double coordinate(const std::string& field, const std::string& place) {
   return value;
 }
 
+double sigma(const std::string& field, const std::string& place) {
+  const double value = coordinate(field, place);
+  if (!(value > 0))
+    throw InputError(fmt::format("{}: sigma_mm is {}; it must be > 0, or leave the column out", place, value));
+  return value;
+}
+
 }  // namespace
 
 Landmarks read_landmarks(const std::filesystem::path& file, const std::string& frame) {
   std::ifstream stream(file);
   if (!stream) throw InputError("landmark file " + file.string() + " cannot be read");
   std::string line;
-  if (!std::getline(stream, line) || split(line) != std::vector<std::string>{"name", "x", "y", "z"})
-    throw InputError(file.string() + ":1: the header must be name,x,y,z");
+  const std::vector<std::string> plain = {"name", "x", "y", "z"}, with_sigma = {"name", "x", "y", "z", "sigma_mm"};
+  std::vector<std::string> header;
+  if (std::getline(stream, line)) header = split(line);
+  if (header != plain && header != with_sigma)
+    throw InputError(file.string() + ":1: the header must be name,x,y,z or name,x,y,z,sigma_mm");
 
   Landmarks landmarks;
   std::vector<Eigen::Vector3d> points;
+  std::vector<double> sigmas;
   for (int number = 2; std::getline(stream, line); ++number) {
     if (line.empty() || line == "\r") continue;
     const std::string place = fmt::format("{}:{}", file.string(), number);
     const auto fields = split(line);
-    if (fields.size() != 4)
-      throw InputError(fmt::format("{}: {} fields, 4 expected: name,x,y,z", place, fields.size()));
+    if (fields.size() != header.size())
+      throw InputError(
+          fmt::format("{}: {} fields, {} expected: {}", place, fields.size(), header.size(), fmt::join(header, ",")));
     if (std::find(landmarks.names.begin(), landmarks.names.end(), fields[0]) != landmarks.names.end())
       throw InputError(fmt::format("{}: landmark '{}' stands twice; each name once", place, fields[0]));
     landmarks.names.push_back(fields[0]);
     points.emplace_back(coordinate(fields[1], place), coordinate(fields[2], place), coordinate(fields[3], place));
+    if (header == with_sigma) sigmas.push_back(sigma(fields[4], place));
     if (frame == "RAS") points.back().head<2>() *= -1;
   }
   landmarks.points.resize(static_cast<Eigen::Index>(points.size()), 3);
   for (std::size_t i = 0; i < points.size(); ++i) landmarks.points.row(static_cast<Eigen::Index>(i)) = points[i];
+  landmarks.sigma_mm = Eigen::Map<const Eigen::VectorXd>(sigmas.data(), static_cast<Eigen::Index>(sigmas.size()));
   return landmarks;
 }
 
 void write_landmarks(const Landmarks& landmarks, const std::filesystem::path& file) {
   std::ofstream stream(file);
-  stream << "name,x,y,z\n";
+  const bool with_sigma = landmarks.sigma_mm.size() > 0;
+  stream << (with_sigma ? "name,x,y,z,sigma_mm\n" : "name,x,y,z\n");
   for (std::size_t i = 0; i < landmarks.names.size(); ++i) {
-    const auto p = landmarks.points.row(static_cast<Eigen::Index>(i));
-    stream << fmt::format("{},{:.3f},{:.3f},{:.3f}\n", landmarks.names[i], p.x(), p.y(), p.z());
+    const auto row = static_cast<Eigen::Index>(i);
+    const auto p = landmarks.points.row(row);
+    stream << fmt::format("{},{:.3f},{:.3f},{:.3f}", landmarks.names[i], p.x(), p.y(), p.z());
+    if (with_sigma) stream << fmt::format(",{}", landmarks.sigma_mm[row]);
+    stream << "\n";
   }
   if (!stream.flush()) throw Error("writing " + file.string() + " failed (disk full?)");
 }

@@ -13,13 +13,16 @@ namespace supine {
 struct Landmarks {
   std::vector<std::string> names;
   Points points;
+  Eigen::VectorXd sigma_mm = {};  ///< 1 sigma of each point's error along every axis; empty: not stated
 };
 
-/// Reads a CSV file with the header `name,x,y,z`, mm, in @p frame (LPS or RAS; converted to LPS).
-/// @throws InputError  naming file and line: wrong header, not four fields, not a number, a name twice
+/// Reads a CSV file with the header `name,x,y,z` or `name,x,y,z,sigma_mm`, mm, in @p frame (LPS or RAS; converted to
+/// LPS).
+/// @throws InputError  naming file and line: wrong header, more or fewer fields than it has, not a number, a sigma_mm
+///   that is not > 0, a name twice
 Landmarks read_landmarks(const std::filesystem::path& file, const std::string& frame = "LPS");
 
-/// Writes the same format, LPS, three decimals.
+/// Writes the same format, LPS, three decimals; sigma_mm where it is stated.
 void write_landmarks(const Landmarks& landmarks, const std::filesystem::path& file);
 
 }  // namespace supine

@@ -39,7 +39,18 @@ std::vector<std::string> names(bool outside) {
   return found;
 }
 
-double drawn(const Draw& draw, Random& random) {
+/// Strengths that are somewhere in a range.
+double within(const Draw& draw, double share) {
+  if (draw.how == How::log_uniform) return draw.lower * std::pow(draw.upper / draw.lower, share);
+  return draw.lower + share * (draw.upper - draw.lower);
+}
+
+double drawn(const Draw& draw, Random& random, std::optional<double> size) {
+  if (size) {
+    const double sign = draw.how == How::either_sign ? random.sign() : 1;
+    random.uniform();  // so that what follows is as without a size
+    return sign * within(draw, *size);
+  }
   switch (draw.how) {
     case How::uniform:
       return random.uniform(draw.lower, draw.upper);
@@ -73,18 +84,22 @@ std::vector<std::string> outside_causes() { return names(true); }
 
 const std::vector<Draw>& draws_of(const std::string& name) { return cause_kind(name).draws; }
 
-Cause draw_cause(const std::string& name, std::uint64_t seed) {
+Cause draw_cause(const std::string& name, std::uint64_t seed, std::optional<double> size) {
   const CauseKind& kind = cause_kind(name);
+  if (size && kind.draws.front().how == How::spread)
+    throw InputError(
+        fmt::format("the size of '{}' is normal and has no range: leave the size out, or the cause", name));
   Random random(seed, name);
-  Cause cause{name, kind.outside, {}, {}};
+  Cause cause{.name = name, .outside = kind.outside};
   for (std::size_t i = 0; i < kind.draws.size(); ++i) {
     const Draw& draw = kind.draws[i];
     auto& target = draw.of_place ? cause.place : cause.values;
     if (draw.how != How::direction) {
-      target[draw.name] = drawn(draw, random);
+      target[draw.name] = drawn(draw, random, i == 0 ? size : std::nullopt);
       continue;
     }
-    const double length = random.uniform(draw.lower, draw.upper), angle = random.uniform(0, 2 * std::numbers::pi);
+    const double chosen = random.uniform(draw.lower, draw.upper), length = size ? within(draw, *size) : chosen;
+    const double angle = random.uniform(0, 2 * std::numbers::pi);
     target[draw.name] = length * std::cos(angle);
     target[kind.draws.at(++i).name] = length * std::sin(angle);
   }

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "phantom/scan.h"
 
-#include <Eigen/Geometry>
 #include <cmath>
-#include <numbers>
-#include <optional>
 
-#include "phantom/causes/cause_kind.h"
 #include "phantom/face_grid.h"
 #include "phantom/random.h"
 #include "simulation/embedding.h"
@@ -14,31 +10,7 @@
 namespace supine::phantom {
 namespace {
 
-constexpr double point_spacing_mm = 2.4, landmark_noise_mm = 0.2;
-
-struct Motion {
-  Eigen::Vector3d shift_mm, turn_rad;
-};
-
-std::optional<Motion> motion_of(const std::vector<Cause>& causes, const std::string& pose, std::uint64_t seed) {
-  for (const Cause& given : causes) {
-    if (!cause_kind(given.name).moves_scan) continue;
-    const Cause cause = pose == "supine" ? given : draw_cause(given.name, seed + 0x9e3779b9u);
-    const auto v = [&cause](const char* name) { return cause.values.at(name); };
-    return Motion{{v("shift_x_mm"), v("shift_y_mm"), v("shift_z_mm")},
-                  {v("turn_x_rad"), v("turn_y_rad"), v("turn_z_rad")}};
-  }
-  return std::nullopt;
-}
-
-void move_all(const Motion& motion, Scan& scan) {
-  const double angle = motion.turn_rad.norm();
-  const Eigen::Vector3d axis = angle > 0 ? Eigen::Vector3d(motion.turn_rad / angle) : Eigen::Vector3d::UnitX();
-  const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
-  const Eigen::RowVector3d centre = scan.surface.points.colwise().mean();
-  for (Points* points : {&scan.surface.points, &scan.landmarks.points})
-    *points = ((points->rowwise() - centre) * turn.transpose()).rowwise() + (centre + motion.shift_mm.transpose());
-}
+constexpr double point_spacing_mm = 2.4;
 
 // Two to four round holes; three in four lie below the breast, where a scanner sees least.
 std::vector<char> in_holes(const BodyMesh& body_mesh, const Points& skin, Random& random) {
@@ -82,6 +54,8 @@ Points with_noise(const Points& points, const Points& normals, const ScanOptions
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     noisy.row(i) += options.noise_mm * random.normal() * normals.row(i);
     for (int k = 0; k < 3; ++k) noisy(i, k) += options.isotropic_mm * random.normal();
+    for (const RandomField& field : options.shared)
+      noisy.row(i) += field.at(points.row(i).transpose()) * normals.row(i);
   }
   return noisy;
 }
@@ -89,7 +63,7 @@ Points with_noise(const Points& points, const Points& normals, const ScanOptions
 }  // namespace
 
 Scan scan_pose(const BodyMesh& body_mesh, const Body& body, const std::string& pose, const Points& x,
-               const std::vector<Cause>& causes, std::uint64_t seed, const ScanOptions& options) {
+               std::uint64_t seed, const ScanOptions& options) {
   Random random(seed, "scan " + pose);
   const std::vector<int> skin_faces = faces_with(body_mesh.mesh, static_cast<int>(reconstruction::Region::skin));
   const double around = 2 * body.reach * body.foot_radius_mm;
@@ -97,21 +71,20 @@ Scan scan_pose(const BodyMesh& body_mesh, const Body& body, const std::string& p
   const FaceGrid grid(body_mesh.mesh, skin_faces, std::max(1, static_cast<int>(std::lround(edge / point_spacing_mm))));
   const Points skin = grid.at(x);
   const Points noisy = with_noise(skin, point_normals(skin, grid.triangles()), options, random);
-  Scan scan{without(noisy, grid.triangles(), in_holes(body_mesh, skin, random)),
-            mark_skin(body_mesh, body, pose, x, seed)};
-  if (const auto motion = motion_of(causes, pose, seed)) move_all(*motion, scan);
-  return scan;
+  return {without(noisy, grid.triangles(), in_holes(body_mesh, skin, random)),
+          mark_skin(body_mesh, body, pose, x, seed, options.landmarks)};
 }
 
 Landmarks mark_skin(const BodyMesh& body_mesh, const Body& body, const std::string& pose, const Points& x,
-                    std::uint64_t seed) {
+                    std::uint64_t seed, const LandmarkError& error) {
   Random random(seed, "landmarks " + pose);
   Landmarks marks{{"nipple", "lateral", "medial", "upper", "lower"}, Points(5, 3)};
   const double out = 0.55 / body.reach;
   const Eigen::Vector2d places[] = {{0, 0}, {out, 0}, {-out, 0}, {0, out}, {0, -out}};
   for (int i = 0; i < 5; ++i) marks.points.row(i) = body.world(body.place(places[i], 1)).transpose();
   marks.points = simulation::Embedding(body_mesh.mesh, marks.points).at(x);
-  for (Eigen::Index i = 0; i < marks.points.size(); ++i) marks.points.data()[i] += landmark_noise_mm * random.normal();
+  for (Eigen::Index i = 0; i < marks.points.size(); ++i) marks.points.data()[i] += error.sigma_mm * random.normal();
+  if (error.stated) marks.sigma_mm = Eigen::VectorXd::Constant(5, error.sigma_mm);
   return marks;
 }
 

@@ -1,9 +1,26 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "phantom/truth.h"
 
+#include "simulation/catalogue.h"
+#include "simulation/parameters.h"
 #include "simulation/solve/equilibrium.h"
 
 namespace supine::phantom {
+namespace {
+
+simulation::Model full_model(const Body& body, const std::vector<Cause>& causes, const Nuisances* nuisances) {
+  simulation::Model model = truth_model(body);
+  if (nuisances != nullptr) nuisances->change(model);
+  for (const Cause& cause : causes) {
+    if (!cause.by_catalogue) continue;
+    simulation::EffectSetting setting = simulation::null_setting(*simulation::find_effect(cause.name));
+    for (const auto& [name, value] : cause.values) setting.parameters[name].value = value;
+    model.effects.push_back(setting);
+  }
+  return model;
+}
+
+}  // namespace
 
 std::vector<TruthPose> truth_poses(bool tilt) {
   std::vector<TruthPose> poses = {{"prone", {0, -1, 0}, {}}, {"supine", {0, 1, 0}, {}}};
@@ -23,21 +40,38 @@ simulation::Model truth_model(const Body& body) {
   return model;
 }
 
-void solve_truth(const BodyMesh& body_mesh, const Body& body, const std::vector<Cause>& causes,
-                 std::vector<TruthPose>& poses) {
-  const simulation::Model model = truth_model(body);
-  simulation::Mechanics mechanics(body_mesh.mesh, body_mesh.anatomy, model);
+Truth::Truth(const BodyMesh& body_mesh, const Body& body, const std::vector<Cause>& causes, const Nuisances* nuisances)
+    : body_mesh_(body_mesh),
+      body_(body),
+      causes_(causes),
+      nuisances_(nuisances),
+      model_(full_model(body, causes, nuisances)),
+      mechanics_(body_mesh.mesh, body_mesh.anatomy, model_) {}
+
+simulation::Fields<double> Truth::fields(const TruthPose& pose) const {
+  const simulation::Scene scene{body_mesh_.mesh, body_mesh_.anatomy, mechanics_.layout(), pose.name};
+  auto fields = simulation::values_of(simulation::make_fields(model_, scene, pose.gravity));
+  const Stage stage{body_, body_mesh_.mesh, mechanics_.layout(), pose.name};
+  if (nuisances_ != nullptr) nuisances_->apply(stage, fields);
+  for (const Cause& cause : causes_)
+    if (!cause.by_catalogue) apply_cause(cause, stage, fields);
+  return fields;
+}
+
+const simulation::Mechanics& Truth::in(const TruthPose& pose) {
+  mechanics_.set_fields(fields(pose));
+  return mechanics_;
+}
+
+void Truth::solve(std::vector<TruthPose>& poses) {
   simulation::SolveOptions options;
   options.step_tolerance_mm = 1e-6;
   options.residual_tolerance = 1e-9;
-  simulation::EquilibriumSolver solver(mechanics, options);
+  simulation::EquilibriumSolver solver(mechanics_, options);
   for (TruthPose& pose : poses) {
-    const simulation::Scene scene{body_mesh.mesh, body_mesh.anatomy, mechanics.layout(), pose.name};
-    auto fields = simulation::values_of(simulation::make_fields(model, scene, pose.gravity));
-    for (const Cause& cause : causes) apply_cause(cause, {body, body_mesh.mesh, mechanics.layout(), pose.name}, fields);
-    mechanics.set_fields(fields);
+    in(pose);
     solver.forget();
-    solver.forward(body_mesh.mesh.points, pose.x, "undeformed → " + pose.name);
+    solver.forward(body_mesh_.mesh.points, pose.x, "undeformed → " + pose.name);
   }
 }
 

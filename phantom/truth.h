@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "phantom/cause.h"
+#include "phantom/nuisances.h"
+#include "simulation/mechanics.h"
 
 namespace supine::phantom {
 
@@ -22,9 +24,27 @@ std::vector<TruthPose> truth_poses(bool tilt);
 /// Base model of the truth; moduli of @p body.
 simulation::Model truth_model(const Body& body);
 
-/// Lets the stress-free body hang prone and lie in the other poses: one forward solve each, from no load.
-/// @throws NumericalFailure  no equilibrium
-void solve_truth(const BodyMesh& body_mesh, const Body& body, const std::vector<Cause>& causes,
-                 std::vector<TruthPose>& poses);
+/// A stress-free body with its causes and, where there are any, its nuisances.
+class Truth {
+ public:
+  /// @param nuisances  or nullptr   @pre  it, mesh and body outlive the object
+  Truth(const BodyMesh& body_mesh, const Body& body, const std::vector<Cause>& causes, const Nuisances* nuisances);
+
+  /// Material and loads of one pose.
+  simulation::Fields<double> fields(const TruthPose& pose) const;
+  /// The mechanics of one pose, until the next is asked for.
+  const simulation::Mechanics& in(const TruthPose& pose);
+  /// Lets the body hang prone and lie in the other poses: one forward solve each, from no load.
+  /// @throws NumericalFailure  no equilibrium
+  void solve(std::vector<TruthPose>& poses);
+
+ private:
+  const BodyMesh& body_mesh_;
+  const Body& body_;
+  std::vector<Cause> causes_;
+  const Nuisances* nuisances_;
+  simulation::Model model_;
+  simulation::Mechanics mechanics_;
+};
 
 }  // namespace supine::phantom

@@ -15,7 +15,8 @@ void apply(const Cause& cause, const Stage& stage, Fields& fields) {
 
 const bool known = add_cause_kind({.name = "adhesion",
                                    .draws = {{"log_factor", Draw::How::uniform, 1.5, 4}, unevenness, unevenness_at},
-                                   .apply = apply});
+                                   .apply = apply,
+                                   .nuisance = {{"log_factor", "log_tangential"}}});
 
 }  // namespace
 }  // namespace supine::phantom

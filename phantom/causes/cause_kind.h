@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct CauseKind {
   std::function<double(const Cause&)> labels_grown_mm = {};
   /// Where the scan lies: its values are shift_x_mm … and turn_x_rad …, drawn anew for every scan but the supine one.
   bool moves_scan = false;
+  /// Of its parameters, those that share a coordinate with a nuisance (nuisances.h), and which.
+  std::map<std::string, std::string> nuisance = {};
 };
 
 /// Adds a kind; for objects with static storage, one per file. @return true

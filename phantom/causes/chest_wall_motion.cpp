@@ -21,7 +21,8 @@ const bool known = add_cause_kind({.name = "chest_wall_motion",
                                              {"centre_u", Draw::How::uniform, -0.2, 0.2, true},
                                              {"centre_v", Draw::How::uniform, -0.2, 0.2, true},
                                              {"radius", Draw::How::uniform, 0.85, 1.2, true}},
-                                   .apply = apply});
+                                   .apply = apply,
+                                   .nuisance = {{"amplitude_mm", "breath_mm"}}});
 
 }  // namespace
 }  // namespace supine::phantom

@@ -10,8 +10,10 @@ void apply(const Cause& cause, const Stage& stage, Fields& fields) {
       cause.values.at("log_ratio") * stage.mesh.fraction.col(static_cast<int>(segmentation::Tissue::gland));
 }
 
-const bool known =
-    add_cause_kind({.name = "gland_stiffness", .draws = {{"log_ratio", Draw::How::uniform, 0.9, 2.3}}, .apply = apply});
+const bool known = add_cause_kind({.name = "gland_stiffness",
+                                   .draws = {{"log_ratio", Draw::How::uniform, 0.9, 2.3}},
+                                   .apply = apply,
+                                   .nuisance = {{"log_ratio", "log_gland_ratio"}}});
 
 }  // namespace
 }  // namespace supine::phantom

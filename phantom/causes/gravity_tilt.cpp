@@ -16,7 +16,8 @@ void apply(const Cause& cause, const Stage& stage, Fields& fields) {
 const bool known = add_cause_kind(
     {.name = "gravity_tilt",
      .draws = {{"roll_rad", Draw::How::direction, 0.08, 0.25}, {"pitch_rad", Draw::How::direction, 0.08, 0.25}},
-     .apply = apply});
+     .apply = apply,
+     .nuisance = {{"roll_rad", "gravity_roll_rad"}, {"pitch_rad", "gravity_pitch_rad"}}});
 
 }  // namespace
 }  // namespace supine::phantom

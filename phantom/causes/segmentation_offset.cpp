@@ -4,10 +4,10 @@
 namespace supine::phantom {
 namespace {
 
-const bool known =
-    add_cause_kind({.name = "segmentation_offset",
-                    .draws = {{"offset_mm", Draw::How::either_sign, 0.6, 1.5}},
-                    .labels_grown_mm = [](const Cause& cause) { return -cause.values.at("offset_mm"); }});
+const bool known = add_cause_kind({.name = "segmentation_offset",
+                                   .draws = {{"offset_mm", Draw::How::either_sign, 0.6, 1.5}},
+                                   .labels_grown_mm = [](const Cause& cause) { return -cause.values.at("offset_mm"); },
+                                   .nuisance = {{"offset_mm", "imaged_skin_mm"}}});
 
 }  // namespace
 }  // namespace supine::phantom

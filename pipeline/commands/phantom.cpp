@@ -2,6 +2,7 @@
 #include "phantom/phantom.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "common/error.h"
 #include "pipeline/tool/tool.h"
@@ -17,20 +18,32 @@ class PhantomTool : public Tool {
   std::string name() const override { return "supine-phantom"; }
 
   std::string summary() const override {
-    return "Makes a case whose answer is known and kept elsewhere: a computed breast with one, two or no effects that "
+    return "Makes a case whose answer is known and kept elsewhere: a computed breast with one, some or no effects that "
            "the base model lacks.\n"
            "-o names the case folder; the answer is written beside it, answers/NAME.json, or where --answer says. The "
            "case folder tells nothing of the answer.\n\n"
            "Examples:\n"
            "  supine-phantom --effect ligament --seed 7 -o trials/case-007\n"
            "  supine-phantom --effect null --tilt -o trials/case-008\n"
+           "  supine-phantom --realistic --effect ligament --effect adhesion --seed 3 -o trials/case-010\n"
+           "  supine-phantom --prior --seed 4 --tilt -o trials/case-011\n"
            "  supine-phantom --outside coil_contact --seed 9 -o trials/case-009 --answer sealed/9.json\n";
   }
 
   void declare(CLI::App& app) override {
-    app.add_option("--effect", effects_, "an effect of the catalogue (supine-model list), or null; up to two");
+    app.add_option("--effect", effects_,
+                   "an effect of the catalogue (supine-model list), or null; up to two, three with --realistic");
     app.add_option("--outside", options_.outside,
-                   "a cause that is not in the catalogue: coil_contact, scar or skin_gradient");
+                   fmt::format("a cause that is not in the catalogue: {}", fmt::join(phantom::outside_causes(), ", ")));
+    app.add_option("--size", options_.size, "of every cause: 0 to 1 in the range it has; default: drawn");
+    app.add_flag(
+        "--realistic", options_.realistic,
+        "with what patients bring and no model has: patchy tissue and skin, a muscle that lies elsewhere, mild "
+        "stiffening, shared scan error, and nuisances such as the place of the scans");
+    app.add_flag(
+        "--prior", options_.prior,
+        "effects, nuisances and what no effect explains drawn from their priors; excludes --effect, --outside, "
+        "--size and --realistic");
     app.add_option("--seed", options_.seed, "of body, sizes, noise and holes")->capture_default_str();
     app.add_flag("--tilt", options_.tilt, "also a scan of the body tilted by 45 degrees");
     app.add_option("--noise-mm", options_.noise_mm, "scanner noise along the normal, 1 sigma, 0 to 5")
@@ -84,6 +97,10 @@ class PhantomTool : public Tool {
   }
 
   void take_effects() {
+    if (options_.prior && !effects_.empty())
+      throw InputError(
+          "--prior excludes --effect: it draws number, names and sizes of the effects itself; leave one of "
+          "them out");
     bool none = false;
     for (const std::string& effect : effects_) {
       none = none || effect == "null";
@@ -93,11 +110,43 @@ class PhantomTool : public Tool {
       throw InputError("--effect null means no cause at all; leave it out or leave the others out");
   }
 
-  static Json cause_figures(const phantom::Cause& cause) {
+  Json cause_figures(const phantom::Cause& cause) const {
     Json figures{{"name", cause.name}, {"outside", cause.outside}};
     figures["parameters"] = cause.values;
     figures["place"] = cause.place;
+    if (options_.realistic || options_.prior) figures["nuisance_sigma"] = phantom::nuisance_sigma(cause.name);
     return figures;
+  }
+
+  static Json vector_figures(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+  static Json nuisance_figures(const phantom::Phantom& phantom) {
+    const phantom::Nuisances& nuisances = *phantom.nuisances;
+    Json figures{{"width", nuisances.width()}};
+    for (const auto& [name, value] : nuisances.numbers()) figures[name] = value;
+    for (const phantom::MeasuredPose& pose : phantom.contents.poses)
+      figures["poses"][pose.name] = nuisances.numbers_of(pose.name);
+    for (const auto& [name, size] : nuisances.field_sizes())
+      figures["fields"][name] = {{"sd", size.sd}, {"length_mm", size.length_mm}};
+    return figures;
+  }
+
+  static Json discrepancy_figures(const phantom::Phantom& phantom) {
+    Json figures{{"size_mm", phantom.discrepancy->size_mm()}};
+    for (const phantom::MeasuredPose& pose : phantom.contents.poses)
+      figures["rms_mm"][pose.name] = phantom.discrepancy->rms_mm(pose.name);
+    return figures;
+  }
+
+  /// What cases with nuisances have beside the rest.
+  void add_nuisances(const phantom::Phantom& phantom, Json& f) const {
+    f["drawn"] = options_.prior ? "prior" : "realistic";
+    f["nuisances"] = nuisance_figures(phantom);
+    for (const auto& [pose, place] : phantom.places)
+      f["scan_place"][pose] = {{"shift_mm", vector_figures(place.shift_mm)},
+                               {"turn_rad", vector_figures(place.turn_rad)}};
+    f["neither_right_nor_wrong"] = phantom.nuisances->look_like();
+    if (phantom.discrepancy) f["discrepancy"] = discrepancy_figures(phantom);
   }
 
   Json figures(const fs::path& folder, const phantom::Phantom& phantom) const {
@@ -106,6 +155,8 @@ class PhantomTool : public Tool {
     f["seed"] = options_.seed;
     f["causes"] = Json::array();
     for (const phantom::Cause& cause : phantom.causes) f["causes"].push_back(cause_figures(cause));
+    if (options_.size) f["size"] = *options_.size;
+    if (phantom.nuisances) add_nuisances(phantom, f);
     f["base"] = {{"breast.young_modulus_kpa", phantom.body.breast_kpa},
                  {"skin.young_modulus_kpa", phantom.body.skin_kpa}};
     f["side"] = phantom.body.side;

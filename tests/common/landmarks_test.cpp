@@ -40,6 +40,15 @@ TEST_F(LandmarksTest, ReadsAndWritesTheSame) {
   EXPECT_EQ(read_landmarks(copy).points, landmarks.points);
 }
 
+TEST_F(LandmarksTest, SigmaIsReadAndWritten) {
+  const Landmarks landmarks = read_landmarks(write("name,x,y,z,sigma_mm\nnipple,1,2,3,1.5\nupper,4,5,6,0.25\n"));
+  EXPECT_EQ(landmarks.sigma_mm, Eigen::Vector2d(1.5, 0.25));
+  const fs::path copy = write("");
+  write_landmarks(landmarks, copy);
+  EXPECT_EQ(read_landmarks(copy).sigma_mm, landmarks.sigma_mm);
+  EXPECT_EQ(read_landmarks(write("name,x,y,z\nnipple,1,2,3\n")).sigma_mm.size(), 0);
+}
+
 TEST_F(LandmarksTest, RasIsTurnedToLps) {
   const Landmarks landmarks = read_landmarks(write("name,x,y,z\na,1,2,3\n"), "RAS");
   EXPECT_EQ(landmarks.points.row(0), Eigen::RowVector3d(-1, -2, 3));
@@ -51,6 +60,11 @@ TEST_F(LandmarksTest, BadFilesAreRefusedWithTheLine) {
   expect_refused("name,x,y,z\na,1,2,three\n", "three");
   expect_refused("name,x,y,z\na,1,nan,3\n", "nan");
   expect_refused("name,x,y,z\na,1,2,3\na,4,5,6\n", "twice");
+  expect_refused("name,x,y,z,sigma\na,1,2,3,1\n", "name,x,y,z,sigma_mm");
+  expect_refused("name,x,y,z,sigma_mm\na,1,2,3,1\nb,1,2,3\n", ":3: 4 fields, 5 expected");
+  expect_refused("name,x,y,z,sigma_mm\na,1,2,3,0\n", ":2: sigma_mm is 0");
+  expect_refused("name,x,y,z,sigma_mm\na,1,2,3,-1.5\n", ":2: sigma_mm is -1.5");
+  expect_refused("name,x,y,z,sigma_mm\na,1,2,3,wide\n", "'wide'");
   EXPECT_THROW(read_landmarks("no-such-file.csv"), InputError);
 }
 

@@ -127,7 +127,7 @@ TEST(Truth, EveryPoseIsAnEquilibrium) {
   Fields scene(5);
   const std::vector<Cause> causes = {draw_cause("ligament", 5), draw_cause("coil_contact", 5)};
   auto poses = truth_poses(true);
-  solve_truth(scene.body_mesh, scene.body, causes, poses);
+  Truth(scene.body_mesh, scene.body, causes, nullptr).solve(poses);
   ASSERT_EQ(poses.size(), 3u);
   simulation::Sums sums(scene.mechanics.pattern());
   const simulation::Demand demand{.energy = false, .residual = true};
@@ -242,6 +242,30 @@ TEST(PhantomRefuses, WhatCannotBeMade) {
   says(refused([](auto& o) { o.effects = {"gremlins"}; }), "no cause 'gremlins'");
   says(refused([](auto& o) { o.effects = {"creep", "creep"}; }), "given twice");
   says(refused([](auto& o) { o.effects = {"creep", "ligament", "friction"}; }), "at most two");
+  says(refused([](auto& o) {
+         o.realistic = true;
+         o.effects = {"creep", "ligament", "friction"};
+         o.outside = {"scar"};
+       }),
+       "a realistic one three");
+  says(refused([](auto& o) { o.size = 1.5; }), "size is 1.5");
+  says(refused([](auto& o) { o.size = 0.5; }), "--size excludes a case without causes");
+  says(refused([](auto& o) { o.prior = o.realistic = true; }), "--prior excludes --realistic");
+  says(refused([](auto& o) {
+         o.prior = true;
+         o.effects = {"creep"};
+       }),
+       "--prior excludes --effect");
+  says(refused([](auto& o) {
+         o.prior = true;
+         o.outside = {"scar"};
+       }),
+       "--prior excludes --outside");
+  says(refused([](auto& o) {
+         o.prior = true;
+         o.size = 0.5;
+       }),
+       "--prior excludes --size");
   says(refused([](auto& o) { o.effects = {"scar"}; }), "--outside");
   says(refused([](auto& o) { o.outside = {"creep"}; }), "--effect");
 }

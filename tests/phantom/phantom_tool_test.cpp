@@ -66,6 +66,43 @@ TEST(PhantomTool, CaseFolderTellsNothing) {
   }
 }
 
+// Of a realistic case the folder says no more than of any other, but that landmarks have an error.
+TEST(PhantomTool, RealisticCaseKeepsItsNuisancesInTheAnswer) {
+  TemporaryFolder folder;
+  const Words realistic = {"--realistic", "--seed", "6", "--tilt", "--effect"};
+  for (const auto& [place, effects] :
+       {std::pair{"null", Words{"null"}},
+        std::pair{"three", Words{"creep", "--effect", "ligament", "--effect", "friction"}}}) {
+    Words options = realistic;
+    options.insert(options.end(), effects.begin(), effects.end());
+    const Finished made = phantom(folder.path() / place / "case-001", options);
+    ASSERT_EQ(made.code, 0) << made.err;
+  }
+  for (const char* file : {"case.toml", "model.toml"})
+    EXPECT_EQ(read_text(folder / "null/case-001" / file), read_text(folder / "three/case-001" / file));
+  EXPECT_EQ(read_text(folder / "null/case-001/supine_landmarks.csv").rfind("name,x,y,z,sigma_mm\n", 0), 0u);
+  const Json answer = Json::parse(read_text(folder / "three/answers/case-001.json"));
+  EXPECT_EQ(answer["drawn"], "realistic");
+  EXPECT_EQ(answer["causes"].size(), 3u);
+  for (const char* pose : {"supine", "tilt45"}) {
+    EXPECT_TRUE(answer["nuisances"]["poses"][pose].contains("gravity_roll_rad"));
+    EXPECT_EQ(answer["scan_place"][pose]["shift_mm"][1], answer["nuisances"]["poses"][pose]["shift_y_mm"]);
+  }
+  EXPECT_EQ(answer["nuisances"]["fields"]["muscle_mm"], (Json{{"sd", 0.7}, {"length_mm", 30}}));
+  EXPECT_FALSE(answer.contains("discrepancy"));
+}
+
+TEST(PhantomTool, PriorDrawsEverythingItself) {
+  TemporaryFolder folder;
+  const Finished made = phantom(folder / "case-001", {"--prior", "--seed", "8"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  const Json answer = Json::parse(read_text(folder / "answers/case-001.json"));
+  EXPECT_EQ(answer["drawn"], "prior");
+  EXPECT_GT(answer["discrepancy"]["size_mm"], 0);
+  EXPECT_TRUE(answer["discrepancy"]["rms_mm"].contains("supine"));
+  EXPECT_TRUE(answer["neither_right_nor_wrong"].empty());
+}
+
 struct BadCall {
   Words options;
   std::string says;
@@ -77,6 +114,9 @@ TEST(PhantomTool, RefusesInOneMessageAndWritesNothing) {
   for (const BadCall& bad :
        {BadCall{{"--effect", "gremlins"}, "no cause 'gremlins'"},
         BadCall{{"--effect", "null", "--effect", "creep"}, "null"}, BadCall{{"--noise-mm", "-1"}, "noise_mm"},
+        BadCall{{"--prior", "--effect", "null"}, "--prior excludes --effect"},
+        BadCall{{"--prior", "--realistic"}, "--prior excludes --realistic"},
+        BadCall{{"--size", "0.5", "--effect", "misregistration"}, "'misregistration' is normal"},
         BadCall{{"--answer", inside}, "lies in the case folder"},
         BadCall{{"--answer", (folder / "answer.txt").string()}, ".json"}, BadCall{{"--effect", "scar"}, "--outside"}}) {
     const Finished finished = phantom(folder / "case-001", bad.options);
