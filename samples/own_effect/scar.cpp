@@ -20,9 +20,14 @@ class Scar : public supine::simulation::Effect {
   std::string meaning() const override { return "a patch of stiffer skin, lower and outer"; }
 
   const std::vector<Parameter>& parameters() const override {
-    // name, unit, null, lower, upper, usual value, its spread (log), one-sided, meaning
-    static const std::vector<Parameter> rows = {
-        {"log_ratio", "1", 0, 0, 4, 1.5, 0.7, true, "ln of the scar's stiffness over the skin's"}};
+    static const std::vector<Parameter> rows = {{.name = "log_ratio",
+                                                 .unit = "1",
+                                                 .lower = 0,
+                                                 .upper = 4,
+                                                 .median = 1.5,
+                                                 .spread = 0.7,
+                                                 .one_sided = true,
+                                                 .meaning = "ln of the scar's stiffness over the skin's"}};
     return rows;
   }
 

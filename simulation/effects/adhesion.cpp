@@ -6,8 +6,13 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& Adhesion::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"log_factor", "1", 0, -1.5, 5, 2, 1.5, false, "ln of the factor on the tangential interface stiffness"}};
+  static const std::vector<Parameter> rows = {{.name = "log_factor",
+                                               .unit = "1",
+                                               .lower = -1.5,
+                                               .upper = 5,
+                                               .median = 2,
+                                               .spread = 1.5,
+                                               .meaning = "ln of the factor on the tangential interface stiffness"}};
   return rows;
 }
 

@@ -7,11 +7,38 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& ChestWallMotion::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"amplitude_mm", "mm", 0, -15, 15, 0, 5, false, "how far the muscle has come out in the middle of the hill"},
-      {"centre_lateral", "1", 0, -0.4, 0.4, 0, 0.15, false, "the hill's middle from the foot's, in foot radii", true},
-      {"centre_head", "1", 0, -0.4, 0.4, 0, 0.15, false, "the same toward the head", true},
-      {"radius", "1", 1, 0.7, 1.4, 1, 0.15, false, "where the hill ends, in foot radii", true}};
+  static const std::vector<Parameter> rows = {{.name = "amplitude_mm",
+                                               .unit = "mm",
+                                               .lower = -15,
+                                               .upper = 15,
+                                               .median = 0,
+                                               .spread = 5,
+                                               .meaning = "how far the muscle has come out in the middle of the hill"},
+                                              {.name = "centre_lateral",
+                                               .unit = "1",
+                                               .lower = -0.4,
+                                               .upper = 0.4,
+                                               .median = 0,
+                                               .spread = 0.15,
+                                               .meaning = "the hill's middle from the foot's, in foot radii",
+                                               .shape = true},
+                                              {.name = "centre_head",
+                                               .unit = "1",
+                                               .lower = -0.4,
+                                               .upper = 0.4,
+                                               .median = 0,
+                                               .spread = 0.15,
+                                               .meaning = "the same toward the head",
+                                               .shape = true},
+                                              {.name = "radius",
+                                               .unit = "1",
+                                               .null = 1,
+                                               .lower = 0.7,
+                                               .upper = 1.4,
+                                               .median = 1,
+                                               .spread = 0.15,
+                                               .meaning = "where the hill ends, in foot radii",
+                                               .shape = true}};
   return rows;
 }
 

@@ -7,7 +7,14 @@ namespace supine::simulation {
 
 const std::vector<Parameter>& Creep::parameters() const {
   static const std::vector<Parameter> rows = {
-      {"log_softening", "1", 0, 0, 0.36, 0.1, 0.7, true, "ln of the modulus in the other poses over the one in prone"}};
+      {.name = "log_softening",
+       .unit = "1",
+       .lower = 0,
+       .upper = 0.36,
+       .median = 0.1,
+       .spread = 0.7,
+       .one_sided = true,
+       .meaning = "ln of the modulus in the other poses over the one in prone"}};
   return rows;
 }
 

@@ -6,7 +6,14 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& Friction::parameters() const {
-  static const std::vector<Parameter> rows = {{"coefficient", "1", 0, 0, 0.6, 0.2, 0.7, true, "Coulomb's coefficient"}};
+  static const std::vector<Parameter> rows = {{.name = "coefficient",
+                                               .unit = "1",
+                                               .lower = 0,
+                                               .upper = 0.6,
+                                               .median = 0.2,
+                                               .spread = 0.7,
+                                               .one_sided = true,
+                                               .meaning = "Coulomb's coefficient"}};
   return rows;
 }
 

@@ -6,9 +6,20 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& GravityTilt::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"roll_rad", "rad", 0, -0.6, 0.6, 0, 0.15, false, "rotation about the head axis (+z LPS)"},
-      {"pitch_rad", "rad", 0, -0.6, 0.6, 0, 0.15, false, "rotation about the left axis (+x LPS)"}};
+  static const std::vector<Parameter> rows = {{.name = "roll_rad",
+                                               .unit = "rad",
+                                               .lower = -0.6,
+                                               .upper = 0.6,
+                                               .median = 0,
+                                               .spread = 0.15,
+                                               .meaning = "rotation about the head axis (+z LPS)"},
+                                              {.name = "pitch_rad",
+                                               .unit = "rad",
+                                               .lower = -0.6,
+                                               .upper = 0.6,
+                                               .median = 0,
+                                               .spread = 0.15,
+                                               .meaning = "rotation about the left axis (+x LPS)"}};
   return rows;
 }
 

@@ -6,8 +6,13 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& Incompressibility::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"log_factor", "1", 0, -0.7, 4, 0, 0.5, false, "a of 0.5 - nu becoming (0.5 - nu) e^-a"}};
+  static const std::vector<Parameter> rows = {{.name = "log_factor",
+                                               .unit = "1",
+                                               .lower = -0.7,
+                                               .upper = 4,
+                                               .median = 0,
+                                               .spread = 0.5,
+                                               .meaning = "a of 0.5 - nu becoming (0.5 - nu) e^-a"}};
   return rows;
 }
 

@@ -7,8 +7,13 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& LeftRightStiffness::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"log_ratio", "1", 0, -2, 2, 0, 0.3, false, "ln of the left breast's stiffness over the right one's"}};
+  static const std::vector<Parameter> rows = {{.name = "log_ratio",
+                                               .unit = "1",
+                                               .lower = -2,
+                                               .upper = 2,
+                                               .median = 0,
+                                               .spread = 0.3,
+                                               .meaning = "ln of the left breast's stiffness over the right one's"}};
   return rows;
 }
 

@@ -46,11 +46,32 @@ double rigid_stiffness(const Scene& scene, const Eigen::VectorXd& weight) {
 }  // namespace
 
 const std::vector<Parameter>& Ligament::parameters() const {
-  static const std::vector<Parameter> rows = {{"stiffness_kpa_per_mm", "kPa/mm", 0, 0, 4, 0.4, 1.0, true,
-                                               "tangential and normal stiffness per area of the ring"},
-                                              {"offset_mm", "mm", 0, -30, 30, 0, 4, false,
-                                               "distance of the ring's middle from the foot, outward positive", true},
-                                              {"width_mm", "mm", 12, 1, 60, 12, 4, false, "width of the ring", true}};
+  static const std::vector<Parameter> rows = {
+      {.name = "stiffness_kpa_per_mm",
+       .unit = "kPa/mm",
+       .lower = 0,
+       .upper = 4,
+       .median = 0.4,
+       .spread = 1.0,
+       .one_sided = true,
+       .meaning = "tangential and normal stiffness per area of the ring"},
+      {.name = "offset_mm",
+       .unit = "mm",
+       .lower = -30,
+       .upper = 30,
+       .median = 0,
+       .spread = 4,
+       .meaning = "distance of the ring's middle from the foot, outward positive",
+       .shape = true},
+      {.name = "width_mm",
+       .unit = "mm",
+       .null = 12,
+       .lower = 1,
+       .upper = 60,
+       .median = 12,
+       .spread = 4,
+       .meaning = "width of the ring",
+       .shape = true}};
   return rows;
 }
 

@@ -6,8 +6,13 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& SegmentationOffset::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"offset_mm", "mm", 0, -3, 3, 0, 0.5, false, "how far outside the imaged skin the true one lies"}};
+  static const std::vector<Parameter> rows = {{.name = "offset_mm",
+                                               .unit = "mm",
+                                               .lower = -3,
+                                               .upper = 3,
+                                               .median = 0,
+                                               .spread = 0.5,
+                                               .meaning = "how far outside the imaged skin the true one lies"}};
   return rows;
 }
 

@@ -6,7 +6,14 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& SkinStiffening::parameters() const {
-  static const std::vector<Parameter> rows = {{"exponent", "1", 0, 0, 6, 1, 0.7, true, "b of the exponential law"}};
+  static const std::vector<Parameter> rows = {{.name = "exponent",
+                                               .unit = "1",
+                                               .lower = 0,
+                                               .upper = 6,
+                                               .median = 1,
+                                               .spread = 0.7,
+                                               .one_sided = true,
+                                               .meaning = "b of the exponential law"}};
   return rows;
 }
 

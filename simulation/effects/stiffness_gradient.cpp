@@ -6,9 +6,20 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& StiffnessGradient::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"lateral", "1", 0, -1.5, 1.5, 0, 0.5, false, "change of ln E per foot radius toward the outer side"},
-      {"head", "1", 0, -1.5, 1.5, 0, 0.5, false, "change of ln E per foot radius toward the head"}};
+  static const std::vector<Parameter> rows = {{.name = "lateral",
+                                               .unit = "1",
+                                               .lower = -1.5,
+                                               .upper = 1.5,
+                                               .median = 0,
+                                               .spread = 0.5,
+                                               .meaning = "change of ln E per foot radius toward the outer side"},
+                                              {.name = "head",
+                                               .unit = "1",
+                                               .lower = -1.5,
+                                               .upper = 1.5,
+                                               .median = 0,
+                                               .spread = 0.5,
+                                               .meaning = "change of ln E per foot radius toward the head"}};
   return rows;
 }
 
