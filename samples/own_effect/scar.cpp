@@ -34,13 +34,14 @@ class Scar : public supine::simulation::Effect {
   /// Multiplies the stiffness of the skin by exp(log_ratio) in the middle of the patch, fading to 1 at its border.
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
              Fields<Dual>& fields) const override {
+    const Dual& log_ratio = values[0];
     const Eigen::Vector2d centre(0.35, -0.35);  // outer, lower; in radii of the breast's foot
     constexpr double radius = 0.4;
     const auto& skin = scene.layout.skin;
     for (Eigen::Index f = 0; f < skin.faces.size(); ++f) {
       const double r = (skin.q.row(f).transpose() - centre).norm() / radius;
       if (r >= 1) continue;
-      fields.skin_modulus[f] *= ceres::exp(values[0] * std::pow(1 - r * r, 2));
+      fields.skin_modulus[f] *= ceres::exp(log_ratio * std::pow(1 - r * r, 2));
     }
   }
 };

@@ -18,7 +18,8 @@ const std::vector<Parameter>& Adhesion::parameters() const {
 
 void Adhesion::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                      Fields<Dual>& fields) const {
-  const Dual factor = ceres::exp(values[0]);
+  const Dual& log_factor = values[0];
+  const Dual factor = ceres::exp(log_factor);
   for (Dual& k : fields.interface_tangential) k *= factor;
 }
 

@@ -56,13 +56,15 @@ const std::vector<Parameter>& ArmTraction::parameters() const {
 void ArmTraction::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                         Fields<Dual>& fields) const {
   if (scene.pose == "prone") return;
+  const Dual &lateral_kpa = values[0], &head_kpa = values[1], &centre_lateral = values[2], &centre_head = values[3],
+             &radius = values[4];
   const FaceGroup& skin = scene.layout.skin;
   for (Eigen::Index f = 0; f < skin.faces.size(); ++f) {
-    const Dual weight = bump(skin.q.row(f).transpose(), values[2], values[3], values[4]);
+    const Dual weight = bump(skin.q.row(f).transpose(), centre_lateral, centre_head, radius);
     if (weight.a == 0) continue;
     const meshing::Anatomy& breast = scene.anatomy.breast_frame(skin.breast[f]);
     for (int i = 0; i < 3; ++i)
-      fields.skin_traction[3 * f + i] += weight * (values[0] * breast.lateral[i] + values[1] * breast.head[i]);
+      fields.skin_traction[3 * f + i] += weight * (lateral_kpa * breast.lateral[i] + head_kpa * breast.head[i]);
   }
 }
 

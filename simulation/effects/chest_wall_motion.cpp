@@ -45,9 +45,10 @@ const std::vector<Parameter>& ChestWallMotion::parameters() const {
 void ChestWallMotion::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                             Fields<Dual>& fields) const {
   if (scene.pose == "prone") return;
+  const Dual &amplitude_mm = values[0], &centre_lateral = values[1], &centre_head = values[2], &radius = values[3];
   const Table& q = scene.layout.interface.q;
   for (Eigen::Index p = 0; p < q.rows(); ++p)
-    fields.muscle_offset[p] += values[0] * bump(q.row(p).transpose(), values[1], values[2], values[3]);
+    fields.muscle_offset[p] += amplitude_mm * bump(q.row(p).transpose(), centre_lateral, centre_head, radius);
 }
 
 }  // namespace supine::simulation

@@ -21,7 +21,8 @@ const std::vector<Parameter>& Creep::parameters() const {
 void Creep::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                   Fields<Dual>& fields) const {
   if (scene.pose != "prone") return;
-  for (Dual& e : fields.ln_young) e -= values[0];
+  const Dual& log_softening = values[0];
+  for (Dual& e : fields.ln_young) e -= log_softening;
 }
 
 }  // namespace supine::simulation

@@ -19,7 +19,8 @@ const std::vector<Parameter>& FibreAnisotropy::parameters() const {
 
 void FibreAnisotropy::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                             Fields<Dual>& fields) const {
-  for (Dual& k : fields.fibre_modulus) k += values[0];
+  const Dual& stiffness_kpa = values[0];
+  for (Dual& k : fields.fibre_modulus) k += stiffness_kpa;
 }
 
 }  // namespace supine::simulation

@@ -19,7 +19,8 @@ const std::vector<Parameter>& Friction::parameters() const {
 
 void Friction::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                      Fields<Dual>& fields) const {
-  for (Dual& mu : fields.interface_friction) mu += values[0];
+  const Dual& coefficient = values[0];
+  for (Dual& mu : fields.interface_friction) mu += coefficient;
 }
 
 }  // namespace supine::simulation

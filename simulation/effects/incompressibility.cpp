@@ -18,8 +18,9 @@ const std::vector<Parameter>& Incompressibility::parameters() const {
 
 void Incompressibility::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                               Fields<Dual>& fields) const {
+  const Dual& log_factor = values[0];
   // As a step toward 0.5, so that a = 0 leaves ν bit for bit.
-  const Dual share(-std::expm1(-values[0].a), std::exp(-values[0].a) * values[0].v);
+  const Dual share(-std::expm1(-log_factor.a), std::exp(-log_factor.a) * log_factor.v);
   for (Dual& nu : fields.poisson) nu += (0.5 - nu) * share;
 }
 

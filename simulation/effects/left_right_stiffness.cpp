@@ -20,8 +20,9 @@ const std::vector<Parameter>& LeftRightStiffness::parameters() const {
 void LeftRightStiffness::apply(const Scene& scene, std::span<const Dual> values,
                                const std::map<std::string, std::string>&, Fields<Dual>& fields) const {
   if (scene.anatomy.breasts.empty()) return;
+  const Dual& log_ratio = values[0];
   for (Eigen::Index c = 0; c < fields.ln_young.size(); ++c)
-    fields.ln_young[c] += values[0] * (scene.layout.cell_breast[c] == 0 ? 0.5 : -0.5);
+    fields.ln_young[c] += log_ratio * (scene.layout.cell_breast[c] == 0 ? 0.5 : -0.5);
 }
 
 }  // namespace supine::simulation

@@ -90,16 +90,17 @@ const std::vector<OptionRow>& Ligament::options() const {
 
 void Ligament::apply(const Scene& scene, std::span<const Dual> values,
                      const std::map<std::string, std::string>& options, Fields<Dual>& fields) const {
+  const Dual &stiffness_kpa_per_mm = values[0], &offset_mm = values[1], &width_mm = values[2];
   const auto& group = scene.layout.interface;
   std::vector<Dual> weight(group.q.rows(), Dual(0.0));
   Eigen::VectorXd plain = Eigen::VectorXd::Zero(group.q.rows());
   for (Eigen::Index p = 0; p < group.q.rows(); ++p) {
     const Eigen::Vector2d q = group.q.row(p).transpose();
     if (!in_arc(options.at("arc"), q)) continue;
-    weight[p] = ring_weight(scene.anatomy.breast_frame(group.breast[p]).from_foot_mm(q) - values[1], 0.5 * values[2]);
+    weight[p] = ring_weight(scene.anatomy.breast_frame(group.breast[p]).from_foot_mm(q) - offset_mm, 0.5 * width_mm);
     plain[p] = weight[p].a;
   }
-  const Dual stiffness = options.at("tie") == "rigid" ? Dual(rigid_stiffness(scene, plain)) : values[0];
+  const Dual stiffness = options.at("tie") == "rigid" ? Dual(rigid_stiffness(scene, plain)) : stiffness_kpa_per_mm;
   for (Eigen::Index p = 0; p < group.q.rows(); ++p) {
     fields.interface_normal[p] += stiffness * weight[p];
     fields.interface_tangential[p] += stiffness * weight[p];

@@ -18,9 +18,10 @@ const std::vector<Parameter>& SegmentationOffset::parameters() const {
 
 void SegmentationOffset::apply(const Scene& scene, std::span<const Dual> values,
                                const std::map<std::string, std::string>&, Fields<Dual>& fields) const {
-  if (values[0].a == 0 && values[0].v[0] == 0) return;
+  const Dual& offset_mm = values[0];
+  if (offset_mm.a == 0 && offset_mm.v[0] == 0) return;
   const Eigen::VectorXd& unit = scene.layout.unit_skin_offset(scene);
-  for (Eigen::Index i = 0; i < unit.size(); ++i) fields.imaged_offset[i] += values[0] * unit[i];
+  for (Eigen::Index i = 0; i < unit.size(); ++i) fields.imaged_offset[i] += offset_mm * unit[i];
 }
 
 }  // namespace supine::simulation

@@ -18,7 +18,8 @@ const std::vector<Parameter>& SkinPrestretch::parameters() const {
 
 void SkinPrestretch::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                            Fields<Dual>& fields) const {
-  for (Dual& stretch : fields.skin_prestretch) stretch += values[0];
+  const Dual& excess = values[0];
+  for (Dual& stretch : fields.skin_prestretch) stretch += excess;
 }
 
 }  // namespace supine::simulation

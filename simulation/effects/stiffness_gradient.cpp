@@ -25,9 +25,9 @@ const std::vector<Parameter>& StiffnessGradient::parameters() const {
 
 void StiffnessGradient::apply(const Scene& scene, std::span<const Dual> values,
                               const std::map<std::string, std::string>&, Fields<Dual>& fields) const {
+  const Dual &lateral = values[0], &head = values[1];
   const Table& q = scene.layout.cell_q;
-  for (Eigen::Index c = 0; c < fields.ln_young.size(); ++c)
-    fields.ln_young[c] += values[0] * q(c, 0) + values[1] * q(c, 1);
+  for (Eigen::Index c = 0; c < fields.ln_young.size(); ++c) fields.ln_young[c] += lateral * q(c, 0) + head * q(c, 1);
 }
 
 }  // namespace supine::simulation

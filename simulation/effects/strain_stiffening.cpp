@@ -19,7 +19,8 @@ const std::vector<Parameter>& StrainStiffening::parameters() const {
 
 void StrainStiffening::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                              Fields<Dual>& fields) const {
-  for (Dual& b : fields.stiffening) b += values[0];
+  const Dual& exponent = values[0];
+  for (Dual& b : fields.stiffening) b += exponent;
 }
 
 }  // namespace supine::simulation
