@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "simulation/base_parameters.h"
 #include "simulation/parameter.h"
 
 namespace supine::meshing {
@@ -70,8 +71,5 @@ bool add_to_catalogue(const Effect& effect);
 
 /// @return nullptr for an unknown name
 const Effect* find_effect(const std::string& name);
-
-/// Rows of the base model, named by their place in model.toml: "breast.young_modulus_kpa", "skin.thickness_mm", …
-const std::vector<Parameter>& base_parameters();
 
 }  // namespace supine::simulation
