@@ -18,7 +18,7 @@ using simulation::Setting;
 double scale_of(const Setting& setting, const Parameter& row) {
   if (setting.prior_sd) return *setting.prior_sd;
   if (row.one_sided && row.median > 0) return row.median;
-  if (!row.one_sided && row.log_sd > 0) return row.log_sd;
+  if (!row.one_sided && row.spread > 0) return row.spread;
   return std::max(std::abs(setting.value), 1e-3);
 }
 

@@ -21,7 +21,7 @@ bool has(const simulation::Model& model, const Effect& effect) {
 
 double typical_size(const Parameter& row) {
   const double size = std::abs(row.median - row.null);
-  return size > 0 ? size : row.log_sd;
+  return size > 0 ? size : row.spread;
 }
 
 }  // namespace

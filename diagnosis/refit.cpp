@@ -89,7 +89,7 @@ Job prepared(const RefitProblem& problem, const Candidate& candidate, const Scor
     if (!falls || !place) continue;
     for (const double side : {-place_start_sd, place_start_sd}) {
       auto elsewhere = usual;
-      elsewhere.emplace_back(candidate.effect + "." + row.name, row.median + side * row.log_sd);
+      elsewhere.emplace_back(candidate.effect + "." + row.name, row.median + side * row.spread);
       job.starts.push_back(start_at(*job.parameters, base, problem.base->fit.u, elsewhere));
     }
   }

@@ -33,10 +33,21 @@ std::vector<const Effect*>& entries() {
   static const StrainStiffening strain_stiffening;
   static const FibreAnisotropy fibre_anisotropy;
   static const Incompressibility incompressibility;
-  static const TissueStiffness gland(
-      Tissue::gland, {"log_ratio", "1", 0, -1.5, 3, 1.5, 0.7, false, "ln of gland stiffness over fat stiffness"});
-  static const TissueStiffness tumour(
-      Tissue::tumour, {"log_ratio", "1", 0, 0, 2.6, 1.5, 0.7, true, "ln of tumour stiffness over fat stiffness"});
+  static const TissueStiffness gland(Tissue::gland, {.name = "log_ratio",
+                                                     .unit = "1",
+                                                     .lower = -1.5,
+                                                     .upper = 3,
+                                                     .median = 1.5,
+                                                     .spread = 0.7,
+                                                     .meaning = "ln of gland stiffness over fat stiffness"});
+  static const TissueStiffness tumour(Tissue::tumour, {.name = "log_ratio",
+                                                       .unit = "1",
+                                                       .lower = 0,
+                                                       .upper = 2.6,
+                                                       .median = 1.5,
+                                                       .spread = 0.7,
+                                                       .one_sided = true,
+                                                       .meaning = "ln of tumour stiffness over fat stiffness"});
   static const StiffnessGradient stiffness_gradient;
   static const LeftRightStiffness left_right_stiffness;
   static const SkinPrestretch skin_prestretch;
@@ -85,26 +96,6 @@ bool is_measurement_effect(const std::string& effect) {
 const Effect& place_of_scan() {
   return **std::find_if(catalogue().begin(), catalogue().end(),
                         [](const Effect* effect) { return effect->traits().moves_scan; });
-}
-
-const std::vector<Parameter>& base_parameters() {
-  static const std::vector<Parameter> rows = {
-      {"breast.young_modulus_kpa", "kPa", 0, 1e-3, 1e4, 0.5, 0.7, true, "Young's modulus of the breast"},
-      {"breast.poisson_ratio", "1", 0, 0, 0.4999, 0.45, 0.05, true, "Poisson's ratio of the breast, below 0.5"},
-      {"breast.mooney_share", "1", 0, 0, 1, 0.5, 0.3, true, "share of C01 in C10 + C01 of the mooney_rivlin law"},
-      {"breast.yeoh_c2_ratio", "1", 0, 0, 100, 1, 0.7, true, "C2/C1 of the yeoh law"},
-      {"breast.yeoh_c3_ratio", "1", 0, 0, 100, 0, 0.7, true, "C3/C1 of the yeoh law"},
-      {"breast.gent_limit", "1", 0, 0.1, 1000, 4, 0.7, true, "Jm of the gent law: limit of I1 - 3 - 2 ln J"},
-      {"breast.density_kg_m3", "kg/m3", 0, 1, 5000, 1000, 0.05, true, "density of the breast"},
-      {"skin.young_modulus_kpa", "kPa", 0, 0, 1e6, 20, 0.8, true, "Young's modulus of the skin; 0 = no skin membrane"},
-      {"skin.thickness_mm", "mm", 0, 1e-3, 10, 1.5, 0.3, true, "thickness of the skin"},
-      {"skin.compression_share", "1", 0, 0, 1, 0.05, 0.5, true,
-       "share of the full energy kept where the skin wrinkles"},
-      {"skin.poisson_ratio", "1", 0, 0, 0.4999, 0.45, 0.05, true, "Poisson's ratio of the corotational skin"},
-      {"interface.normal_kpa_per_mm", "kPa/mm", 0, 1e-6, 1e6, 3, 1, true, "stiffness against leaving the muscle"},
-      {"interface.tangential_kpa_per_mm", "kPa/mm", 0, 1e-9, 1e6, 0.01, 1, true, "stiffness against sliding, > 0"},
-      {"cut.stiffness_kpa_per_mm", "kPa/mm", 0, 1e-6, 1e6, 1, 1, true, "stiffness of the body behind the cut"}};
-  return rows;
 }
 
 }  // namespace supine::simulation

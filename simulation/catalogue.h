@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "simulation/base_parameters.h"
 #include "simulation/effect.h"
 
 namespace supine::simulation {
@@ -29,8 +30,5 @@ bool is_measurement_effect(const std::string& effect);
 
 /// The effect that says where a scan lies: the catalogue's first that moves it.
 const Effect& place_of_scan();
-
-/// Rows of the base model, named by their place in model.toml: "breast.young_modulus_kpa", "skin.thickness_mm", …
-const std::vector<Parameter>& base_parameters();
 
 }  // namespace supine::simulation

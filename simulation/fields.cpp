@@ -110,7 +110,7 @@ Fields<Dual> base_fields(const Model& model, const Scene& scene, const Eigen::Ve
                          const std::string& varied) {
   const Layout& layout = scene.layout;
   const Eigen::Index cells = layout.cell_q.rows(), skin = layout.skin.faces.size(), contact = layout.interface.q.rows();
-  const auto number = [&model, &varied](const char* name) {
+  const auto number = [&model, &varied](const std::string& name) {
     Dual value(base_setting(model, name).value);
     if (varied == name) value.v[0] = 1;
     return value;
@@ -122,12 +122,9 @@ Fields<Dual> base_fields(const Model& model, const Scene& scene, const Eigen::Ve
   fields.ln_young = constant(cells, ceres::log(number("breast.young_modulus_kpa")));
   fields.poisson = constant(cells, number("breast.poisson_ratio"));
   fields.law_shape_1 = fields.law_shape_2 = constant(cells, Dual(0.0));
-  if (model.breast.law == BulkLaw::mooney_rivlin) fields.law_shape_1 = constant(cells, number("breast.mooney_share"));
-  if (model.breast.law == BulkLaw::gent) fields.law_shape_1 = constant(cells, number("breast.gent_limit"));
-  if (model.breast.law == BulkLaw::yeoh) {
-    fields.law_shape_1 = constant(cells, number("breast.yeoh_c2_ratio"));
-    fields.law_shape_2 = constant(cells, number("breast.yeoh_c3_ratio"));
-  }
+  for (const BaseParameter& row : base_parameters())
+    if (row.bulk_law == model.breast.law)
+      (row.law_shape == 1 ? fields.law_shape_1 : fields.law_shape_2) = constant(cells, number(row.name));
   fields.density = constant(cells, number("breast.density_kg_m3") * 1e-9);  // kg/m³ → kg/mm³
   fields.skin_modulus = constant(skin, number("skin.young_modulus_kpa") * number("skin.thickness_mm"));
   fields.skin_poisson = constant(skin, number("skin.poisson_ratio"));

@@ -33,7 +33,8 @@ struct EffectSetting {
   std::map<std::string, std::string> options;
 };
 
-/// model.toml: what is believed. Units in the names; moduli are Young's.
+/// model.toml: what is believed. Units in the names; moduli are Young's. Every Setting of the base model has a row in
+/// base_parameters.cpp; its default here is the median of its prior.
 struct Model {
   struct {
     BulkLaw law = BulkLaw::neo_hookean;

@@ -7,12 +7,25 @@
 #include "simulation/catalogue.h"
 
 namespace supine::simulation {
+namespace {
+
+const BaseParameter* find_base_row(const std::string& name) {
+  for (const BaseParameter& row : base_parameters())
+    if (row.name == name) return &row;
+  return nullptr;
+}
+
+const BaseParameter& base_row(const std::string& name) {
+  if (const BaseParameter* row = find_base_row(name)) return *row;
+  throw InputError("there is no base parameter '" + name + "'");
+}
+
+}  // namespace
 
 std::string parameter_name(const Effect& effect, const Parameter& row) { return effect.name() + "." + row.name; }
 
 const Parameter* find_parameter(const std::string& name) {
-  for (const Parameter& row : base_parameters())
-    if (row.name == name) return &row;
+  if (const BaseParameter* row = find_base_row(name)) return row;
   const auto dot = name.find('.');
   const Effect* effect = find_effect(name.substr(0, dot));
   if (effect == nullptr || dot == std::string::npos) return nullptr;
@@ -21,44 +34,19 @@ const Parameter* find_parameter(const std::string& name) {
   return nullptr;
 }
 
-Setting& base_setting(Model& model, const std::string& name) {
-  if (name == "breast.young_modulus_kpa") return model.breast.young_modulus_kpa;
-  if (name == "breast.poisson_ratio") return model.breast.poisson_ratio;
-  if (name == "breast.mooney_share") return model.breast.mooney_share;
-  if (name == "breast.yeoh_c2_ratio") return model.breast.yeoh_c2_ratio;
-  if (name == "breast.yeoh_c3_ratio") return model.breast.yeoh_c3_ratio;
-  if (name == "breast.gent_limit") return model.breast.gent_limit;
-  if (name == "breast.density_kg_m3") return model.breast.density_kg_m3;
-  if (name == "skin.young_modulus_kpa") return model.skin.young_modulus_kpa;
-  if (name == "skin.thickness_mm") return model.skin.thickness_mm;
-  if (name == "skin.compression_share") return model.skin.compression_share;
-  if (name == "skin.poisson_ratio") return model.skin.poisson_ratio;
-  if (name == "interface.normal_kpa_per_mm") return model.interface.normal_kpa_per_mm;
-  if (name == "interface.tangential_kpa_per_mm") return model.interface.tangential_kpa_per_mm;
-  if (name == "cut.stiffness_kpa_per_mm") return model.cut.stiffness_kpa_per_mm;
-  throw InputError("there is no base parameter '" + name + "'");
-}
+Setting& base_setting(Model& model, const std::string& name) { return base_row(name).in(model); }
 
-const Setting& base_setting(const Model& model, const std::string& name) {
-  return base_setting(const_cast<Model&>(model), name);
-}
+const Setting& base_setting(const Model& model, const std::string& name) { return base_row(name).in_const(model); }
 
 std::string why_not_of(const Model& model, const std::string& name) {
-  const auto belongs = [&name](const std::string& law) {
-    return "belongs to law = \"" + law + "\"; leave it out or choose that law";
-  };
-  const BulkLaw law = model.breast.law;
-  if (name == "breast.mooney_share" && law != BulkLaw::mooney_rivlin) return belongs("mooney_rivlin");
-  if (name.starts_with("breast.yeoh_") && law != BulkLaw::yeoh) return belongs("yeoh");
-  if (name == "breast.gent_limit" && law != BulkLaw::gent) return belongs("gent");
-  if (name == "skin.poisson_ratio" && model.skin.law == SkinLaw::neo_hookean)
-    return "the neo_hookean skin is incompressible and has none; leave it out or use law = \"corotational\"";
-  return {};
+  const BaseParameter& row = base_row(name);
+  const bool read = row.bulk_law.value_or(model.breast.law) == model.breast.law &&
+                    row.skin_law.value_or(model.skin.law) == model.skin.law;
+  return read ? std::string() : row.why_not;
 }
 
 Setting* find_setting(Model& model, const std::string& name) {
-  for (const Parameter& row : base_parameters())
-    if (row.name == name) return &base_setting(model, name);
+  if (const BaseParameter* row = find_base_row(name)) return &row->in(model);
   for (EffectSetting& effect : model.effects)
     if (name.starts_with(effect.name + ".")) {
       const auto found = effect.parameters.find(name.substr(effect.name.size() + 1));
@@ -69,8 +57,8 @@ Setting* find_setting(Model& model, const std::string& name) {
 
 std::vector<std::string> free_parameters(const Model& model) {
   std::vector<std::string> names;
-  for (const Parameter& row : base_parameters())
-    if (base_setting(model, row.name).free) names.push_back(row.name);
+  for (const BaseParameter& row : base_parameters())
+    if (row.in_const(model).free) names.push_back(row.name);
   for (const Effect* effect : catalogue()) {
     const auto present = std::find_if(model.effects.begin(), model.effects.end(),
                                       [effect](const EffectSetting& s) { return s.name == effect->name(); });

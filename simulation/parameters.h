@@ -21,7 +21,8 @@ const Parameter* find_parameter(const std::string& name);
 Setting& base_setting(Model& model, const std::string& name);
 const Setting& base_setting(const Model& model, const std::string& name);
 
-/// Why a number of the base model means nothing to the laws of this model; empty where it does.
+/// Why the base row @p name means nothing to the laws of this model; empty where it means something.
+/// @throws InputError  no such row
 std::string why_not_of(const Model& model, const std::string& name);
 
 /// The number that @p name stands for in this model, or nullptr: no such parameter, or its effect is not in the model.

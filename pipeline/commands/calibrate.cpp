@@ -31,7 +31,7 @@ void add_scan_offset(simulation::Model& model) {
   const simulation::Effect& effect = simulation::place_of_scan();
   simulation::EffectSetting setting = simulation::null_setting(effect);
   for (const simulation::Parameter& row : effect.parameters())
-    setting.parameters[row.name] = {row.null, true, row.log_sd, row.lower, row.upper};
+    setting.parameters[row.name] = {row.null, true, row.spread, row.lower, row.upper};
   model.effects.push_back(setting);
 }
 

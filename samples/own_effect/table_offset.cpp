@@ -25,9 +25,14 @@ class TableOffset : public Effect {
   double tolerance(const std::string&, const MeasurementTolerances&) const override { return 0.5; }
 
   const std::vector<Parameter>& parameters() const override {
-    // name, unit, null, lower, upper, usual value, its spread, one-sided, meaning
-    static const std::vector<Parameter> rows = {
-        {"height_mm", "mm", 0, -30, 30, 0, 8, false, "how far each scan lies too far back"}};
+    static const std::vector<Parameter> rows = {{.name = "height_mm",
+                                                 .unit = "mm",
+                                                 .null = 0,
+                                                 .lower = -30,
+                                                 .upper = 30,
+                                                 .median = 0,
+                                                 .spread = 8,
+                                                 .meaning = "how far each scan lies too far back"}};
     return rows;
   }
 

@@ -6,14 +6,20 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& Adhesion::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"log_factor", "1", 0, -1.5, 5, 2, 1.5, false, "ln of the factor on the tangential interface stiffness"}};
+  static const std::vector<Parameter> rows = {{.name = "log_factor",
+                                               .unit = "1",
+                                               .lower = -1.5,
+                                               .upper = 5,
+                                               .median = 2,
+                                               .spread = 1.5,
+                                               .meaning = "ln of the factor on the tangential interface stiffness"}};
   return rows;
 }
 
 void Adhesion::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                      Fields<Dual>& fields) const {
-  const Dual factor = ceres::exp(values[0]);
+  const Dual& log_factor = values[0];
+  const Dual factor = ceres::exp(log_factor);
   for (Dual& k : fields.interface_tangential) k *= factor;
 }
 

@@ -6,14 +6,21 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& FibreAnisotropy::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"stiffness_kpa", "kPa", 0, 0, 6, 0.6, 0.8, true, "k_f of k_f/4 (I4 - 1)^2 along the muscle's outward normal"}};
+  static const std::vector<Parameter> rows = {{.name = "stiffness_kpa",
+                                               .unit = "kPa",
+                                               .lower = 0,
+                                               .upper = 6,
+                                               .median = 0.6,
+                                               .spread = 0.8,
+                                               .one_sided = true,
+                                               .meaning = "k_f of k_f/4 (I4 - 1)^2 along the muscle's outward normal"}};
   return rows;
 }
 
 void FibreAnisotropy::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                             Fields<Dual>& fields) const {
-  for (Dual& k : fields.fibre_modulus) k += values[0];
+  const Dual& stiffness_kpa = values[0];
+  for (Dual& k : fields.fibre_modulus) k += stiffness_kpa;
 }
 
 }  // namespace supine::simulation

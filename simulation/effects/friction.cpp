@@ -6,13 +6,21 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& Friction::parameters() const {
-  static const std::vector<Parameter> rows = {{"coefficient", "1", 0, 0, 0.6, 0.2, 0.7, true, "Coulomb's coefficient"}};
+  static const std::vector<Parameter> rows = {{.name = "coefficient",
+                                               .unit = "1",
+                                               .lower = 0,
+                                               .upper = 0.6,
+                                               .median = 0.2,
+                                               .spread = 0.7,
+                                               .one_sided = true,
+                                               .meaning = "Coulomb's coefficient"}};
   return rows;
 }
 
 void Friction::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                      Fields<Dual>& fields) const {
-  for (Dual& mu : fields.interface_friction) mu += values[0];
+  const Dual& coefficient = values[0];
+  for (Dual& mu : fields.interface_friction) mu += coefficient;
 }
 
 }  // namespace supine::simulation

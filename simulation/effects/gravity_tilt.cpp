@@ -6,17 +6,29 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& GravityTilt::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"roll_rad", "rad", 0, -0.6, 0.6, 0, 0.15, false, "rotation about the head axis (+z LPS)"},
-      {"pitch_rad", "rad", 0, -0.6, 0.6, 0, 0.15, false, "rotation about the left axis (+x LPS)"}};
+  static const std::vector<Parameter> rows = {{.name = "roll_rad",
+                                               .unit = "rad",
+                                               .lower = -0.6,
+                                               .upper = 0.6,
+                                               .median = 0,
+                                               .spread = 0.15,
+                                               .meaning = "rotation about the head axis (+z LPS)"},
+                                              {.name = "pitch_rad",
+                                               .unit = "rad",
+                                               .lower = -0.6,
+                                               .upper = 0.6,
+                                               .median = 0,
+                                               .spread = 0.15,
+                                               .meaning = "rotation about the left axis (+x LPS)"}};
   return rows;
 }
 
 void GravityTilt::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                         Fields<Dual>& fields) const {
   if (scene.pose == "prone") return;
-  const Dual cr = ceres::cos(values[0]), sr = ceres::sin(values[0]), cp = ceres::cos(values[1]),
-             sp = ceres::sin(values[1]);
+  const Dual &roll_rad = values[0], &pitch_rad = values[1];
+  const Dual cr = ceres::cos(roll_rad), sr = ceres::sin(roll_rad), cp = ceres::cos(pitch_rad),
+             sp = ceres::sin(pitch_rad);
   const auto g = fields.gravity;
   const Eigen::Matrix<Dual, 3, 1> pitched(g[0], cp * g[1] - sp * g[2], sp * g[1] + cp * g[2]);
   fields.gravity << cr * pitched.x() - sr * pitched.y(), sr * pitched.x() + cr * pitched.y(), pitched.z();

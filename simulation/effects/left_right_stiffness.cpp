@@ -7,16 +7,22 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& LeftRightStiffness::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"log_ratio", "1", 0, -2, 2, 0, 0.3, false, "ln of the left breast's stiffness over the right one's"}};
+  static const std::vector<Parameter> rows = {{.name = "log_ratio",
+                                               .unit = "1",
+                                               .lower = -2,
+                                               .upper = 2,
+                                               .median = 0,
+                                               .spread = 0.3,
+                                               .meaning = "ln of the left breast's stiffness over the right one's"}};
   return rows;
 }
 
 void LeftRightStiffness::apply(const Scene& scene, std::span<const Dual> values,
                                const std::map<std::string, std::string>&, Fields<Dual>& fields) const {
   if (scene.anatomy.breasts.empty()) return;
+  const Dual& log_ratio = values[0];
   for (Eigen::Index c = 0; c < fields.ln_young.size(); ++c)
-    fields.ln_young[c] += values[0] * (scene.layout.cell_breast[c] == 0 ? 0.5 : -0.5);
+    fields.ln_young[c] += log_ratio * (scene.layout.cell_breast[c] == 0 ? 0.5 : -0.5);
 }
 
 }  // namespace supine::simulation

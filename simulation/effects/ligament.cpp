@@ -46,11 +46,32 @@ double rigid_stiffness(const Scene& scene, const Eigen::VectorXd& weight) {
 }  // namespace
 
 const std::vector<Parameter>& Ligament::parameters() const {
-  static const std::vector<Parameter> rows = {{"stiffness_kpa_per_mm", "kPa/mm", 0, 0, 4, 0.4, 1.0, true,
-                                               "tangential and normal stiffness per area of the ring"},
-                                              {"offset_mm", "mm", 0, -30, 30, 0, 4, false,
-                                               "distance of the ring's middle from the foot, outward positive", true},
-                                              {"width_mm", "mm", 12, 1, 60, 12, 4, false, "width of the ring", true}};
+  static const std::vector<Parameter> rows = {
+      {.name = "stiffness_kpa_per_mm",
+       .unit = "kPa/mm",
+       .lower = 0,
+       .upper = 4,
+       .median = 0.4,
+       .spread = 1.0,
+       .one_sided = true,
+       .meaning = "tangential and normal stiffness per area of the ring"},
+      {.name = "offset_mm",
+       .unit = "mm",
+       .lower = -30,
+       .upper = 30,
+       .median = 0,
+       .spread = 4,
+       .meaning = "distance of the ring's middle from the foot, outward positive",
+       .shape = true},
+      {.name = "width_mm",
+       .unit = "mm",
+       .null = 12,
+       .lower = 1,
+       .upper = 60,
+       .median = 12,
+       .spread = 4,
+       .meaning = "width of the ring",
+       .shape = true}};
   return rows;
 }
 
@@ -69,16 +90,17 @@ const std::vector<OptionRow>& Ligament::options() const {
 
 void Ligament::apply(const Scene& scene, std::span<const Dual> values,
                      const std::map<std::string, std::string>& options, Fields<Dual>& fields) const {
+  const Dual &stiffness_kpa_per_mm = values[0], &offset_mm = values[1], &width_mm = values[2];
   const auto& group = scene.layout.interface;
   std::vector<Dual> weight(group.q.rows(), Dual(0.0));
   Eigen::VectorXd plain = Eigen::VectorXd::Zero(group.q.rows());
   for (Eigen::Index p = 0; p < group.q.rows(); ++p) {
     const Eigen::Vector2d q = group.q.row(p).transpose();
     if (!in_arc(options.at("arc"), q)) continue;
-    weight[p] = ring_weight(scene.anatomy.breast_frame(group.breast[p]).from_foot_mm(q) - values[1], 0.5 * values[2]);
+    weight[p] = ring_weight(scene.anatomy.breast_frame(group.breast[p]).from_foot_mm(q) - offset_mm, 0.5 * width_mm);
     plain[p] = weight[p].a;
   }
-  const Dual stiffness = options.at("tie") == "rigid" ? Dual(rigid_stiffness(scene, plain)) : values[0];
+  const Dual stiffness = options.at("tie") == "rigid" ? Dual(rigid_stiffness(scene, plain)) : stiffness_kpa_per_mm;
   for (Eigen::Index p = 0; p < group.q.rows(); ++p) {
     fields.interface_normal[p] += stiffness * weight[p];
     fields.interface_tangential[p] += stiffness * weight[p];

@@ -6,16 +6,22 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& SegmentationOffset::parameters() const {
-  static const std::vector<Parameter> rows = {
-      {"offset_mm", "mm", 0, -3, 3, 0, 0.5, false, "how far outside the imaged skin the true one lies"}};
+  static const std::vector<Parameter> rows = {{.name = "offset_mm",
+                                               .unit = "mm",
+                                               .lower = -3,
+                                               .upper = 3,
+                                               .median = 0,
+                                               .spread = 0.5,
+                                               .meaning = "how far outside the imaged skin the true one lies"}};
   return rows;
 }
 
 void SegmentationOffset::apply(const Scene& scene, std::span<const Dual> values,
                                const std::map<std::string, std::string>&, Fields<Dual>& fields) const {
-  if (values[0].a == 0 && values[0].v[0] == 0) return;
+  const Dual& offset_mm = values[0];
+  if (offset_mm.a == 0 && offset_mm.v[0] == 0) return;
   const Eigen::VectorXd& unit = scene.layout.unit_skin_offset(scene);
-  for (Eigen::Index i = 0; i < unit.size(); ++i) fields.imaged_offset[i] += values[0] * unit[i];
+  for (Eigen::Index i = 0; i < unit.size(); ++i) fields.imaged_offset[i] += offset_mm * unit[i];
 }
 
 }  // namespace supine::simulation

@@ -6,13 +6,21 @@
 namespace supine::simulation {
 
 const std::vector<Parameter>& SkinStiffening::parameters() const {
-  static const std::vector<Parameter> rows = {{"exponent", "1", 0, 0, 6, 1, 0.7, true, "b of the exponential law"}};
+  static const std::vector<Parameter> rows = {{.name = "exponent",
+                                               .unit = "1",
+                                               .lower = 0,
+                                               .upper = 6,
+                                               .median = 1,
+                                               .spread = 0.7,
+                                               .one_sided = true,
+                                               .meaning = "b of the exponential law"}};
   return rows;
 }
 
 void SkinStiffening::apply(const Scene&, std::span<const Dual> values, const std::map<std::string, std::string>&,
                            Fields<Dual>& fields) const {
-  for (Dual& b : fields.skin_stiffening) b += values[0];
+  const Dual& exponent = values[0];
+  for (Dual& b : fields.skin_stiffening) b += exponent;
 }
 
 }  // namespace supine::simulation

@@ -12,8 +12,9 @@ std::string TissueStiffness::meaning() const {
 
 void TissueStiffness::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                             Fields<Dual>& fields) const {
+  const Dual& log_ratio = values[0];
   for (Eigen::Index c = 0; c < fields.ln_young.size(); ++c)
-    fields.ln_young[c] += values[0] * scene.mesh.fraction(c, static_cast<int>(tissue_));
+    fields.ln_young[c] += log_ratio * scene.mesh.fraction(c, static_cast<int>(tissue_));
 }
 
 }  // namespace supine::simulation

@@ -140,7 +140,7 @@ TEST_P(CatalogueTest, RowsAreConsistent) {
     EXPECT_LE(row.null, row.upper) << row.name;
     EXPECT_GE(row.median, row.lower) << row.name;
     EXPECT_LE(row.median, row.upper) << row.name;
-    EXPECT_GT(row.log_sd, 0) << row.name;
+    EXPECT_GT(row.spread, 0) << row.name;
     if (row.one_sided) {
       EXPECT_EQ(row.null, row.lower) << row.name;
       EXPECT_GT(row.median, 0) << row.name << ": its prior is log-normal";
