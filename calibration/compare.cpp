@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "common/error.h"
@@ -70,6 +71,15 @@ std::vector<AreaError> area_table(const ModelSkin& model, const SkinAreas& areas
   return table;
 }
 
+double rms_of_kept(const Comparison& comparison) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < comparison.used.size(); ++i)
+    if (comparison.used[i]) sum += std::pow(comparison.scan_to_model.distance_mm[i], 2);
+  for (const int i : comparison.outliers.points) sum -= std::pow(comparison.scan_to_model.distance_mm[i], 2);
+  const auto kept = comparison.scan_points_used - static_cast<int>(comparison.outliers.points.size());
+  return std::sqrt(std::max(sum, 0.0) / kept);
+}
+
 void check_areas(const ModelSkin& model, const SkinAreas& areas) {
   const int names = static_cast<int>(areas.names.size());
   for (const int node : model.nodes()) {
@@ -81,7 +91,8 @@ void check_areas(const ModelSkin& model, const SkinAreas& areas) {
 
 }  // namespace
 
-Comparison compare(const ModelSkin& model, const Scan& scan, const SkinAreas& areas, const CoverageBounds& bounds) {
+Comparison compare(const ModelSkin& model, const Scan& scan, const SkinAreas& areas, const CoverageBounds& bounds,
+                   double given_noise_mm) {
   Comparison result;
   model_to_scan(scan, model.node_points(), model.node_normals(), bounds, result.model_to_scan);
   result.mae_study_mm = mae_of_covered(result.model_to_scan);
@@ -101,6 +112,8 @@ Comparison compare(const ModelSkin& model, const Scan& scan, const SkinAreas& ar
   }
   result.scan_points_used = static_cast<int>(distances.size());
   result.scan = figures_of(distances);
+  result.outliers = find_outliers(scan.points(), result.scan_to_model, given_noise_mm);
+  result.rms_kept_mm = rms_of_kept(result);
   if (!areas.names.empty()) {
     check_areas(model, areas);
     result.areas = area_table(model, areas, result);

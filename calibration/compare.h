@@ -6,6 +6,7 @@
 
 #include "calibration/distance_figures.h"
 #include "calibration/model_skin.h"
+#include "calibration/outliers.h"
 #include "calibration/scan.h"
 #include "calibration/signed_distance.h"
 #include "common/landmarks.h"
@@ -37,6 +38,8 @@ struct Comparison {
   SignedDistances scan_to_model;               ///< one row per Scan::points()
   Eigen::Array<bool, Eigen::Dynamic, 1> used;  ///< scan points that are not beyond the model
   int scan_points_used;
+  Outliers outliers;   ///< what a fit would leave out; every other figure counts them
+  double rms_kept_mm;  ///< scan → model, over the used scan points but these
 };
 
 /// Both directions, signed (> 0 where the scan lies outside the model). All means count each point once.
@@ -44,8 +47,10 @@ struct Comparison {
 /// Scan points whose closest point lies on the border of the model's skin are beyond the model (a scan covers more of
 /// the body than the image) and take no part in any figure.
 /// @param areas   may be empty: then there is no area table
+/// @param given_noise_mm  of the scanner, 1 sigma; 0 = not known
 /// @throws InputError  when no scan point lies over the model's skin
-Comparison compare(const ModelSkin& model, const Scan& scan, const SkinAreas& areas, const CoverageBounds& bounds = {});
+Comparison compare(const ModelSkin& model, const Scan& scan, const SkinAreas& areas, const CoverageBounds& bounds = {},
+                   double given_noise_mm = 0);
 
 /// Distances between landmarks of the same name, in the order of @p measured. Predicted ones that were not measured
 /// are left out.

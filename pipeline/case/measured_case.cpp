@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "calibration/noise.h"
+#include "calibration/outliers.h"
 #include "calibration/residuals.h"
 #include "calibration/signed_distance.h"
 #include "common/error.h"
@@ -52,32 +53,22 @@ void solve_start(MeasuredCase& in, const std::vector<Pose>& poses) {
   in.start = chain.solve(in.model);
 }
 
-/// Points of the scan that stand out of their neighbours as no noise does: dirt, hair, a marker, a crossing ray.
-std::vector<int> outliers(Run& run, const calibration::Scan& scan, const calibration::ModelSkin& skin,
+/// Rows of the scan that are left out; told where there are many.
+std::vector<int> left_out(Run& run, const calibration::Scan& scan, const calibration::ModelSkin& skin,
                           double given_noise_mm, const std::string& name) {
   constexpr double worth_a_warning = 0.001;
-  constexpr double least_noise_mm = 0.25;  // a smoothed scan has none, and then every crease would stand out
   calibration::SignedDistances distances;
   calibration::scan_to_model(skin, scan.points(), distances);
-  std::vector<int> over;
-  for (int i = 0; i < scan.points().rows(); ++i)
-    if (!distances.closest.on_border[i]) over.push_back(i);
-  if (static_cast<int>(over.size()) < calibration::Scan::least_points) return {};
-  const Points place = scan.points()(over, Eigen::all);
-  const Eigen::VectorXd distance_mm = distances.distance_mm(over);
-  const double noise_mm =
-      std::max({calibration::estimate_noise_mm(place, distance_mm), given_noise_mm, least_noise_mm});
-  std::vector<int> points;
-  for (const int row : calibration::points_that_stand_out(place, distance_mm, noise_mm))
-    points.push_back(over[static_cast<std::size_t>(row)]);
-  const double share = static_cast<double>(points.size()) / static_cast<double>(over.size());
-  if (share > worth_a_warning)
-    run.warn(
-        fmt::format("{}: {} of {} points over the breast ({:.1f} %) stand out of their neighbours by more than "
-                    "four times the noise ({:.2f} mm), the first at ({:.1f}, {:.1f}, {:.1f}) mm; they are left out",
-                    name, points.size(), over.size(), 100 * share, noise_mm, scan.points()(points.front(), 0),
-                    scan.points()(points.front(), 1), scan.points()(points.front(), 2)));
-  return points;
+  calibration::Outliers found = calibration::find_outliers(scan.points(), distances, given_noise_mm);
+  const double share = static_cast<double>(found.points.size()) / std::max(1, found.over_skin);
+  if (share > worth_a_warning) {
+    const auto first = scan.points().row(found.points.front());
+    run.warn(fmt::format(
+        "{}: {} of {} points over the breast ({:.1f} %) stand out of their neighbours by more than "
+        "four times the noise ({:.2f} mm), the first at ({:.1f}, {:.1f}, {:.1f}) mm; they are left out",
+        name, found.points.size(), found.over_skin, 100 * share, found.noise_mm, first.x(), first.y(), first.z()));
+  }
+  return std::move(found.points);
 }
 
 void read_scan(Run& run, MeasuredCase& in, const Pose& pose, std::size_t row) {
@@ -87,8 +78,8 @@ void read_scan(Run& run, MeasuredCase& in, const Pose& pose, std::size_t row) {
   calibration::Scan scan(surface, skin, name);
   calibration::check_placement(scan, skin, in.mesh.muscle, name);
   auto& list = is_fitted(in.description, pose.name) ? in.fitted : in.held_out;
-  std::vector<int> left_out = outliers(run, scan, skin, pose.noise_mm.value_or(0), name);
-  list.push_back(Measurement{{pose.name, pose.gravity}, std::move(scan), pose.noise_mm, std::move(left_out)});
+  std::vector<int> standing_out = left_out(run, scan, skin, pose.noise_mm.value_or(0), name);
+  list.push_back(Measurement{{pose.name, pose.gravity}, std::move(scan), pose.noise_mm, std::move(standing_out)});
 }
 
 calibration::MeasuredScene scene_of(const MeasuredCase& in, bool whole) {

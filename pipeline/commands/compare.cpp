@@ -83,7 +83,7 @@ class CompareTool : public Tool {
     run.stage("anatomy");
     const calibration::SkinAreas areas = find_areas(inputs);
     run.stage("compare");
-    const Comparison comparison = calibration::compare(model, scan, areas);
+    const Comparison comparison = calibration::compare(model, scan, areas, {}, inputs.pose.noise_mm.value_or(0));
     run.stage("write");
     const fs::path skin_file = target(inputs.pose, "comparison"), scan_file = target(inputs.pose, "scan");
     calibration::write_comparison(comparison, model, areas, run.output(skin_file));
@@ -179,6 +179,8 @@ class CompareTool : public Tool {
     figures["model_points"] = comparison.model_to_scan.covered.size();
     figures["scan_points"] = comparison.used.size();
     figures["scan_points_used"] = comparison.scan_points_used;
+    figures["left_out_points"] = comparison.outliers.points.size();
+    figures["rms_kept_mm"] = comparison.rms_kept_mm;
     figures["areas"] = Json::array();
     for (const auto& area : comparison.areas) {
       figures["areas"].push_back({{"name", area.name},

@@ -52,6 +52,22 @@ TEST(Compare, FlatScanBelowTheModelByHand) {
   EXPECT_NEAR(result.model_to_scan.to_scan.distance_mm[12], -2, 1e-13);
 }
 
+TEST(Compare, ASpikeIsNamedAndCountsInAllFiguresButOne) {
+  const reconstruction::Surface plate = testing::sheet(0, 40, 4);
+  const ModelSkin model(plate.points, plate.triangles);
+  reconstruction::Surface surface =
+      testing::sheet(3, 37, 14, [](double x, double y) { return 0.3 * std::sin(3 * x + 5 * y); });
+  const Scan clean(surface, model);
+  EXPECT_TRUE(compare(model, clean, {}).outliers.points.empty());
+  surface.points(112, 2) = 9;  // in the middle
+  const Comparison result = compare(model, Scan(surface, model), {});
+  EXPECT_EQ(result.outliers.points, std::vector<int>{112});
+  EXPECT_EQ(result.outliers.over_skin, result.scan_points_used);
+  const double n = result.scan_points_used;
+  EXPECT_NEAR(n * std::pow(result.scan.rms_mm, 2) - 81, (n - 1) * std::pow(result.rms_kept_mm, 2), 1e-9);
+  EXPECT_TRUE(compare(model, Scan(surface, model), {}, {}, 5).outliers.points.empty()) << "held against noise of 5 mm";
+}
+
 TEST(Compare, StudyErrorAverageIsOverCoveredPointsOnly) {
   const Plate plate;
   const ModelSkin model = plate.skin();

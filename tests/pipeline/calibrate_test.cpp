@@ -109,6 +109,13 @@ TEST_F(Calibrate, LeavesOutPointsThatStandOutAndSaysSo) {
   EXPECT_LE(left_out("as_it_is"), 2);
   EXPECT_GE(left_out("dirty"), row / 40);  // of one in thirty, some lie beyond the model's skin
   EXPECT_LE(left_out("dirty"), row / 30 + 1);
+  // A comparison with the model that the fit began with calls the same points out.
+  ASSERT_EQ(run("simulate", "start").code, 0);
+  const std::string case_folder = folder().string(), start = (folder() / "start").string();
+  ASSERT_EQ(run_process({tool("compare"), case_folder, start + "/supine.vtu", "-o", start}).code, 0);
+  const Json comparison = json("start/comparison.json");
+  EXPECT_EQ(comparison["left_out_points"], left_out("dirty"));
+  EXPECT_LT(comparison["rms_kept_mm"].get<double>(), 0.9 * comparison["rms_mm"].get<double>());
   for (const char* key : {"rms_mm", "mae_study_mm"}) {
     const double clean = json("as_it_is/calibration.json")[key].get<double>();
     EXPECT_NEAR(json("dirty/calibration.json")[key].get<double>(), clean, 0.2 * clean) << key;
