@@ -13,6 +13,7 @@
 #include "bench/ellipsoid.h"
 #include "common/error.h"
 #include "simulation/laws/bulk_laws.h"
+#include "simulation/model_fields.h"
 #include "simulation/solve/equilibrium.h"
 #include "simulation/solve/linear_solver.h"
 

@@ -16,6 +16,7 @@
 
 #include "common/error.h"
 #include "simulation/laws/bulk_laws.h"
+#include "simulation/model_fields.h"
 #include "simulation/solve/equilibrium.h"
 #include "tests/simulation/scene.h"
 

@@ -18,6 +18,7 @@
 #include "bench/robustness_cases.h"
 #include "common/error.h"
 #include "simulation/laws/bulk_laws.h"
+#include "simulation/model_fields.h"
 #include "simulation/solve/linear_solver.h"
 
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "phantom/cause.h"
+#include "phantom/causes/cause.h"
 
 namespace supine::phantom {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "phantom/cause.h"
+#include "phantom/causes/cause.h"
 #include "phantom/placement.h"
 #include "phantom/random_field.h"
 #include "simulation/model.h"

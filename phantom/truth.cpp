@@ -2,6 +2,7 @@
 #include "phantom/truth.h"
 
 #include "simulation/catalogue.h"
+#include "simulation/model_fields.h"
 #include "simulation/parameters.h"
 #include "simulation/solve/equilibrium.h"
 

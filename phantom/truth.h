@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "phantom/cause.h"
+#include "phantom/causes/cause.h"
 #include "phantom/nuisances.h"
 #include "simulation/mechanics.h"
 

@@ -6,6 +6,7 @@
 
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
+#include "simulation/model.h"
 #include "simulation/terms/term.h"
 
 namespace supine::simulation {

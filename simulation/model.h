@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "simulation/laws/invariant_law_list.h"
+
 namespace supine::simulation {
 
 /// A number of the model: fixed, or free in calibration.
@@ -18,7 +20,9 @@ struct Setting {
   double upper = std::numeric_limits<double>::infinity();
 };
 
-enum class BulkLaw { neo_hookean, mooney_rivlin, yeoh, gent, neo_hookean_calculix, corotational, corotational_qr };
+#define SUPINE_NAME(name, Law) name,
+enum class BulkLaw { SUPINE_INVARIANT_LAWS(SUPINE_NAME) corotational, corotational_qr };
+#undef SUPINE_NAME
 enum class Volumetric { mean, pointwise };
 enum class SkinLaw { neo_hookean, corotational };
 enum class Compression { tension_field, full };

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "phantom/cause.h"
+#include "phantom/causes/cause.h"
 
 namespace supine::phantom {
 

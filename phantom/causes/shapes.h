@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "phantom/cause.h"
+#include "phantom/causes/cause.h"
 
 namespace supine::phantom {
 

@@ -16,6 +16,7 @@
 #include "meshing/mesh_io.h"
 #include "pipeline/case/model_file.h"
 #include "reconstruction/surface_io.h"
+#include "simulation/model_fields.h"
 
 namespace supine::pipeline {
 namespace {

@@ -17,7 +17,7 @@
 #include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/catalogue.h"
-#include "simulation/fields.h"
+#include "simulation/model_fields.h"
 
 namespace supine::pipeline {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "common/error.h"
 #include "simulation/export/exported_pose.h"
-#include "simulation/fields.h"
 #include "simulation/laws/bulk_laws.h"
+#include "simulation/model_fields.h"
 
 namespace supine::simulation {
 namespace {

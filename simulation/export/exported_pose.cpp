@@ -7,7 +7,7 @@
 #include "simulation/elements/elements.h"
 #include "simulation/elements/surface_geometry.h"
 #include "simulation/elements/tet_geometry.h"
-#include "simulation/fields.h"
+#include "simulation/model_fields.h"
 
 namespace supine::simulation {
 namespace {

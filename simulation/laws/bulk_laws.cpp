@@ -7,12 +7,10 @@ namespace supine::simulation {
 
 const std::vector<std::pair<std::string, BulkLaw>>& bulk_law_names() {
   static const std::vector<std::pair<std::string, BulkLaw>> names = {
-      {"neo_hookean", BulkLaw::neo_hookean},
-      {"mooney_rivlin", BulkLaw::mooney_rivlin},
-      {"yeoh", BulkLaw::yeoh},
-      {"gent", BulkLaw::gent},
-      {"neo_hookean_calculix", BulkLaw::neo_hookean_calculix},
-      {"corotational", BulkLaw::corotational},
+#define SUPINE_NAME(name, Law) {#name, BulkLaw::name},
+      SUPINE_INVARIANT_LAWS(SUPINE_NAME)
+#undef SUPINE_NAME
+          {"corotational", BulkLaw::corotational},
       {"corotational_qr", BulkLaw::corotational_qr}};
   return names;
 }

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "common/error.h"
+#include "simulation/model_fields.h"
 #include "simulation/solve/folds.h"
 #include "simulation/solve/pushed_forward.h"
 

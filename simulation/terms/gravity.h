@@ -2,6 +2,7 @@
 #pragma once
 
 #include "simulation/elements/elements.h"
+#include "simulation/model.h"
 #include "simulation/terms/term.h"
 
 namespace supine::simulation {

@@ -14,6 +14,7 @@
 #include "phantom/discrepancy.h"
 #include "phantom/phantom.h"
 #include "simulation/catalogue.h"
+#include "simulation/model_fields.h"
 #include "simulation/parameters.h"
 
 namespace supine::phantom {

@@ -13,6 +13,7 @@
 #include "phantom/voxels.h"
 #include "simulation/catalogue.h"
 #include "simulation/mechanics.h"
+#include "simulation/model_fields.h"
 
 namespace supine::phantom {
 namespace {

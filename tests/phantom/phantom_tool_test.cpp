@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "phantom/cause.h"
+#include "phantom/causes/cause.h"
 #include "tests/pipeline/process.h"
 #include "tests/pipeline/temporary_folder.h"
 

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "common/error.h"
-#include "simulation/fields.h"
 #include "simulation/laws/bulk_laws.h"
+#include "simulation/model_fields.h"
 #include "simulation/parameters.h"
 #include "tests/simulation/scene.h"
 

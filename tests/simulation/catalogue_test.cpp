@@ -7,6 +7,7 @@
 
 #include "common/error.h"
 #include "simulation/mechanics.h"
+#include "simulation/model_fields.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"
 

@@ -9,6 +9,7 @@
 
 #include <cmath>
 
+#include "simulation/model_fields.h"
 #include "simulation/solve/equilibrium.h"
 #include "simulation/solve/linear_solver.h"
 #include "tests/simulation/scene.h"

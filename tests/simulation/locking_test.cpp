@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/error.h"
+#include "simulation/model_fields.h"
 #include "simulation/solve/equilibrium.h"
 #include "simulation/terms/bulk.h"
 #include "tests/simulation/scene.h"

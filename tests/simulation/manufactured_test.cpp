@@ -5,6 +5,7 @@
 
 #include "simulation/laws/bulk_laws.h"
 #include "simulation/mechanics.h"
+#include "simulation/model_fields.h"
 #include "simulation/solve/linear_solver.h"
 #include "tests/simulation/manufactured_problem.h"
 #include "tests/simulation/scene.h"

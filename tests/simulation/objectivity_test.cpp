@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "simulation/laws/bulk_laws.h"
+#include "simulation/model_fields.h"
 #include "simulation/solve/chain.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/shapes.h"

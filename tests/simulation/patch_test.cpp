@@ -8,6 +8,7 @@
 #include "simulation/elements/elements.h"
 #include "simulation/elements/tet_geometry.h"
 #include "simulation/laws/bulk_laws.h"
+#include "simulation/model_fields.h"
 #include "simulation/solve/equilibrium.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"

@@ -3,6 +3,7 @@
 
 #include "simulation/laws/contact_law.h"
 #include "simulation/mechanics.h"
+#include "simulation/model_fields.h"
 #include "tests/simulation/effects/effect_scene.h"
 
 // The forces of the effects' fields.

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/error.h"
+#include "simulation/model_fields.h"
 #include "simulation/parameters.h"
 #include "tests/simulation/effects/effect_scene.h"
 

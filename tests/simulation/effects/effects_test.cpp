@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstring>
 
+#include "simulation/model_fields.h"
 #include "simulation/parameters.h"
 #include "simulation/solve/chain.h"
 #include "tests/simulation/effects/effect_scene.h"

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 
 #include "simulation/mechanics.h"
+#include "simulation/model_fields.h"
 #include "tests/simulation/effects/effect_scene.h"
 
 namespace supine::simulation {

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "simulation/model_fields.h"
 #include "simulation/solve/krylov.h"
 #include "simulation/solve/linear_solver.h"
 #include "tests/simulation/scene.h"

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "simulation/model_fields.h"
 #include "simulation/solve/linear_solver.h"
 #include "simulation/solve/pushed_forward.h"
 #include "tests/simulation/scene.h"

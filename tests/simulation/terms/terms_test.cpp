@@ -4,6 +4,7 @@
 #include <Eigen/SparseCore>
 
 #include "simulation/mechanics.h"
+#include "simulation/model_fields.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"
 

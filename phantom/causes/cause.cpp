@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "phantom/cause.h"
+#include "phantom/causes/cause.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
