@@ -26,7 +26,7 @@ for file in sorted(files):
         continue
     for number, line in enumerate(file.read_text().splitlines(), 1):
         for name in re.findall(r'"([a-z_]+)"', line):
-            if name in names and not (name in columns and file.name in ("fields.h", "fields.cpp")):
+            if name in names and not (name in columns and file.name in ("fields.h", "model_fields.cpp")):
                 found.append(f"{file.relative_to(source)}:{number}: {name}")
 if found:
     sys.exit("effects known by name outside simulation/effects; ask their traits:\n" + "\n".join(found))

@@ -30,7 +30,13 @@ std::vector<std::string> stage_command(const std::string& stage, const std::file
 }
 
 std::vector<std::string> make_command(const std::filesystem::path& folder) {
-  return {"make",
+  // Not a child of the make that runs the tests: its flags would print the folder and count its jobs.
+  return {"env",
+          "-u",
+          "MAKEFLAGS",
+          "-u",
+          "MAKELEVEL",
+          "make",
           "-f",
           std::string(SUPINE_SOURCE_DIR) + "/pipeline/Makefile",
           "BIN=" SUPINE_BIN_DIR,
