@@ -208,7 +208,7 @@ std::string verdict_name(Verdict verdict) {
 }
 
 LackOfFit lack_of_fit(const WeightedFit& fit, const Metric& metric) {
-  const calibration::Fit& f = fit.fit;
+  const calibration::Fit& f = fit.solution;
   const Eigen::VectorXd white = metric.whitening->apply(f.residuals.distance_mm + metric.mean_mm);
   const Eigen::MatrixXd absorbed = orthonormal_basis(metric.whitening->apply(f.linearisation.slope));
   Eigen::MatrixXd shapes = metric.whitening->apply(smooth_shapes(f.residuals));

@@ -34,7 +34,7 @@ class LeftByFit {
 }  // namespace
 
 ErrorBudget error_budget(const WeightedFit& fit, const ErrorSources& sources, const Metric& metric) {
-  const calibration::Fit& f = fit.fit;
+  const calibration::Fit& f = fit.solution;
   const Eigen::MatrixXd& slope = f.linearisation.slope;
   const LeftByFit left(slope, *metric.whitening);
   const double total = mean_square(f.residuals.distance_mm);

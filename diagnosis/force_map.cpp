@@ -152,7 +152,7 @@ double quantile95(std::vector<double> values) {
 
 ForceMap force_map(const calibration::MeasuredScene& scene, const simulation::Model& model, const WeightedFit& fit,
                    const Metric& metric, unsigned seed, int draws) {
-  const calibration::Fit& f = fit.fit;
+  const calibration::Fit& f = fit.solution;
   const calibration::ModelSkin skin(*scene.mesh, f.prediction.solution.poses[0].x);
   const Points nodes = skin.node_points();
   double width = 1;

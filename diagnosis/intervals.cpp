@@ -31,12 +31,12 @@ Errors errors_with(const calibration::MeasuredScene& scene, const ErrorSources& 
   Errors errors{without_tolerance_for(refit.effect, sources), {}};
   if (base != nullptr) {
     try {
-      set_numerical(measure_numerical_error(scene, refit.model, refit.fit.fit, base), tolerances, errors.sources);
+      set_numerical(measure_numerical_error(scene, refit.model, refit.fit.solution, base), tolerances, errors.sources);
     } catch (const NumericalFailure&) {
       // No other mesh carries this model: what was measured without the effect has to do.
     }
   }
-  errors.whitening = Whitening::of(refit.fit.fit.residuals, errors.sources);
+  errors.whitening = Whitening::of(refit.fit.solution.residuals, errors.sources);
   return errors;
 }
 

@@ -21,7 +21,7 @@ Rung rung_of(const Findings& found, const std::string& added) {
 }
 
 RungFigures figures_of(const Refit& refit) {
-  return {refit.effect, refit.fit.fit.residuals.distance_mm.cwiseAbs().mean(), refit.rms_mm, refit.held_out_rms_mm,
+  return {refit.effect, refit.fit.solution.residuals.distance_mm.cwiseAbs().mean(), refit.rms_mm, refit.held_out_rms_mm,
           refit.pose_rms_mm};
 }
 
@@ -78,7 +78,7 @@ Ladder climb(const Subject& subject, const ExamineOptions& options, const Findin
     const std::string added = refit->effect;
     Subject with = examined;
     with.model = refit->model;
-    with.near = &refit->fit.fit.prediction.solution;
+    with.near = &refit->fit.solution.prediction.solution;
     try {
       std::unique_ptr<Findings> after = examine(with, every_rung);
       Rung rung = rung_of(*after, added);

@@ -44,7 +44,7 @@ Eigen::VectorXd step_without_the_others(const calibration::Fit& fit, const FreeP
 
 std::vector<Eigen::VectorXd> left_out_poses_mm(const WeightedFit& fit, const FreeParameters& parameters,
                                                const ErrorSources& sources) {
-  const Residuals& residuals = fit.fit.residuals;
+  const Residuals& residuals = fit.solution.residuals;
   const int poses = residuals.size() > 0 ? residuals.pose.maxCoeff() + 1 : 0;
   std::vector<Eigen::VectorXd> all;
   if (poses < 2) return all;
@@ -53,9 +53,9 @@ std::vector<Eigen::VectorXd> left_out_poses_mm(const WeightedFit& fit, const Fre
     for (Eigen::Index r = 0; r < residuals.size(); ++r)
       (residuals.pose[r] == pose ? own : others).push_back(static_cast<int>(r));
     if (own.empty() || others.empty()) continue;
-    const Eigen::VectorXd step = step_without_the_others(fit.fit, parameters, sources, others);
+    const Eigen::VectorXd step = step_without_the_others(fit.solution, parameters, sources, others);
     all.emplace_back(residuals.distance_mm(own) + sources.mean_mm(own) +
-                     fit.fit.linearisation.slope(own, Eigen::all) * step);
+                     fit.solution.linearisation.slope(own, Eigen::all) * step);
   }
   return all;
 }

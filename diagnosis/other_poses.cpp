@@ -19,11 +19,11 @@ using calibration::FreeParameters;
 using calibration::MeasuredScene;
 using calibration::Prediction;
 
-std::size_t fitted_poses(const WeightedFit& fit) { return fit.fit.prediction.solution.poses.size(); }
+std::size_t fitted_poses(const WeightedFit& fit) { return fit.solution.prediction.solution.poses.size(); }
 
 /// The fit's solution, and the poses it lacks: as far from its undeformed shape as they were in @p base, or there.
 simulation::ChainSolution start_of(const MeasuredScene& whole, const WeightedFit& fit, const OtherPoses* base) {
-  simulation::ChainSolution start = fit.fit.prediction.solution;
+  simulation::ChainSolution start = fit.solution.prediction.solution;
   for (std::size_t first = fitted_poses(fit), m = first; m < whole.measurements.size(); ++m) {
     Points x = start.X;
     if (base != nullptr) x += base->solved[m - first].x - base->X;
@@ -97,7 +97,7 @@ void set_errors(calibration::Evaluator& evaluator, const FreeParameters& paramet
                 const ErrorSources& sources, const Metric& metric, const Tolerances& tolerances,
                 const Prediction& prediction, OtherPoses& others) {
   const MeasuredScene& whole = evaluator.scene();
-  const simulation::Model model = parameters.model(fit.fit.u);
+  const simulation::Model model = parameters.model(fit.solution.u);
   std::vector<double> noise = metric.noise_mm;
   for (std::size_t m = noise.size(); m < whole.measurements.size(); ++m)
     noise.push_back(whole.measurements[m]->noise_mm.value_or(metric.noise_mm.front()));
@@ -117,7 +117,7 @@ void set_errors(calibration::Evaluator& evaluator, const FreeParameters& paramet
   if (!means.empty()) errors.modes.push_back({"mesh", sources.mean_doubt * joined(points_of(means, others.mask))});
   const simulation::Sensitivities sensitivities(evaluator.chain(), model, prediction.solution);
   const Eigen::MatrixXd slope =
-      calibration::linearise(evaluator, sensitivities, parameters, fit.fit.u, prediction, seen.residuals).slope;
+      calibration::linearise(evaluator, sensitivities, parameters, fit.solution.u, prediction, seen.residuals).slope;
   const Eigen::MatrixXd covariance = covariance_of(information(fit, parameters, metric));
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
   const Eigen::MatrixXd shapes = slope * axes.eigenvectors() * axes.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
@@ -161,7 +161,7 @@ std::vector<double> OtherPoses::change_mm(const OtherPoses& other) const {
 OtherPoses other_poses_of_base(const MeasuredScene& whole, const FreeParameters& parameters, const WeightedFit& fit,
                                const ErrorSources& sources, const Metric& metric, const Tolerances& tolerances) {
   OtherPoses others;
-  const simulation::Model model = parameters.model(fit.fit.u);
+  const simulation::Model model = parameters.model(fit.solution.u);
   const std::size_t first = fitted_poses(fit);
   if (!says_the_scan_lies_elsewhere(model) && whole.measurements.size() > first) try {
       calibration::Evaluator evaluator(whole, model, accurate_enough());
@@ -181,7 +181,7 @@ OtherPoses other_poses_of_base(const MeasuredScene& whole, const FreeParameters&
     }
   const std::size_t unfitted = others.distance_mm.size();
   add_left_out(parameters, fit, sources, others);
-  if (others.distance_mm.size() > unfitted) add_noise(fit.fit.residuals, sources.noise_mm, others.noise_mm);
+  if (others.distance_mm.size() > unfitted) add_noise(fit.solution.residuals, sources.noise_mm, others.noise_mm);
   return others;
 }
 
@@ -192,7 +192,7 @@ OtherPoses other_poses_of_refit(const MeasuredScene& whole, const FreeParameters
   others.mask = base.mask;
   others.whitening = base.whitening;
   if (base.unfitted > 0) try {
-      const simulation::Model model = parameters.model(fit.fit.u);
+      const simulation::Model model = parameters.model(fit.solution.u);
       const simulation::ChainSolution start = start_of(whole, fit, &base);
       keep(fit, calibration::Evaluator(whole, model, accurate_enough()).predict(model, &start), sources, others);
       weigh_unfitted(others);

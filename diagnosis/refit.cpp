@@ -154,7 +154,7 @@ bool is_at_border(const Job& job) {
   for (Eigen::Index i = 0; i < parameters.size(); ++i) {
     const std::string& name = parameters.names()[static_cast<std::size_t>(i)];
     if (!name.starts_with(job.effect + ".") || !simulation::find_parameter(name)->shape) continue;
-    const double low = parameters.lower()[i], high = parameters.upper()[i], u = job.fit.fit.u[i];
+    const double low = parameters.lower()[i], high = parameters.upper()[i], u = job.fit.solution.u[i];
     if (std::min(u - low, high - u) < close * (high - low)) return true;
   }
   return false;
@@ -164,7 +164,7 @@ Refit summary(const RefitProblem& problem, Job& job) {
   Refit refit;
   refit.effect = job.effect, refit.solved = job.solved, refit.finished = job.finished, refit.freedom = job.freedom;
   if (!job.solved) return refit;
-  const calibration::Fit& fit = job.fit.fit;
+  const calibration::Fit& fit = job.fit.solution;
   refit.at_border = is_at_border(job);
   refit.gain = problem.base->objective - job.objective;
   refit.bic = refit.gain - refit.freedom * problem.log_points - occam(job);
@@ -226,7 +226,7 @@ std::vector<FittedParameter> linear_intervals(const std::string& effect, const W
   for (Eigen::Index i = 0; i < parameters.size(); ++i) {
     const std::string& name = parameters.names()[static_cast<std::size_t>(i)];
     if (name.rfind(effect + ".", 0) != 0) continue;
-    const double reach = wider * normal_reach95() * std::sqrt(covariance(i, i)), u = fit.fit.u[i];
+    const double reach = wider * normal_reach95() * std::sqrt(covariance(i, i)), u = fit.solution.u[i];
     list.push_back({name, parameters.unit(i), parameters.value(i, u),
                     parameters.value(i, std::max(u - reach, parameters.lower()[i])),
                     parameters.value(i, std::min(u + reach, parameters.upper()[i]))});

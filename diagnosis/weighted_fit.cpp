@@ -13,6 +13,22 @@ namespace {
 using calibration::Evaluator;
 using calibration::FreeParameters;
 
+/// A coordinate is at an end of its range when it is nearer than this; coordinates are of the order of 1.
+constexpr double at_the_end = 1e-9;
+/// Part of the largest curvature that is added to all: two causes that change the same distances leave none.
+constexpr double least_curvature = 1e-9;
+/// Longest step of a coordinate: a factor of 4.5 in a modulus, further than slopes are worth anything.
+constexpr double longest_step = 1.5;
+
+/// Marquardt's damping, in parts of each curvature.
+struct Damping {
+  static constexpr double first = 1e-3;               ///< exact sensitivities: almost Gauss-Newton
+  static constexpr double after_failure = 10;         ///< grows by it where a step gains nothing or has no equilibrium,
+  static constexpr double least_after_failure = 0.1;  ///< and is felt at once
+  static constexpr double given_up = 1e4;             ///< steps of a ten-thousandth gain nothing either
+  static constexpr double well_promised = 0.5;        ///< part of the promised gain above which slopes are trusted more
+};
+
 /// Whitened distances and their slopes, priors as further rows.
 struct Rows {
   Eigen::VectorXd value;
@@ -33,7 +49,7 @@ Rows rows_of(const calibration::Fit& fit, const FreeParameters& parameters, cons
 
 /// F of a prediction, its slopes not needed.
 void evaluate(const FreeParameters& parameters, const Metric& metric, WeightedFit& result) {
-  const calibration::Fit& fit = result.fit;
+  const calibration::Fit& fit = result.solution;
   result.data = metric.whitening->apply(fit.residuals.distance_mm + metric.mean_mm).squaredNorm();
   result.objective = result.data + parameters.prior_deviation(fit.u).squaredNorm();
 }
@@ -42,7 +58,7 @@ void evaluate(const FreeParameters& parameters, const Metric& metric, WeightedFi
 WeightedFit predicted(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
                       const Eigen::VectorXd& u, const simulation::ChainSolution* near) {
   WeightedFit result;
-  calibration::Fit& fit = result.fit;
+  calibration::Fit& fit = result.solution;
   fit.u = u;
   fit.mask = metric.mask;
   fit.prediction = evaluator.predict(parameters.model(u), near);
@@ -52,7 +68,7 @@ WeightedFit predicted(Evaluator& evaluator, const FreeParameters& parameters, co
 }
 
 void add_slopes(Evaluator& evaluator, const FreeParameters& parameters, WeightedFit& result) {
-  calibration::Fit& fit = result.fit;
+  calibration::Fit& fit = result.solution;
   const simulation::Sensitivities sensitivities(evaluator.chain(), parameters.model(fit.u), fit.prediction.solution);
   fit.linearisation =
       calibration::linearise(evaluator, sensitivities, parameters, fit.u, fit.prediction, fit.residuals);
@@ -62,8 +78,8 @@ void add_slopes(Evaluator& evaluator, const FreeParameters& parameters, Weighted
 std::vector<int> movable(const FreeParameters& parameters, const Eigen::VectorXd& u, const Eigen::VectorXd& gradient) {
   std::vector<int> free;
   for (Eigen::Index i = 0; i < u.size(); ++i) {
-    const bool low = u[i] <= parameters.lower()[i] + 1e-9 && gradient[i] > 0;
-    const bool high = u[i] >= parameters.upper()[i] - 1e-9 && gradient[i] < 0;
+    const bool low = u[i] <= parameters.lower()[i] + at_the_end && gradient[i] > 0;
+    const bool high = u[i] >= parameters.upper()[i] - at_the_end && gradient[i] < 0;
     if (!low && !high) free.push_back(static_cast<int>(i));
   }
   return free;
@@ -78,10 +94,9 @@ Eigen::VectorXd step_of(const FreeParameters& parameters, const Rows& rows, cons
   const Eigen::MatrixXd j = rows.slope(Eigen::all, free);
   Eigen::MatrixXd h = j.transpose() * j;
   h.diagonal() *= 1 + damping;
-  h.diagonal().array() += 1e-9 * h.diagonal().maxCoeff();
+  h.diagonal().array() += least_curvature * h.diagonal().maxCoeff();
   const Eigen::VectorXd part = -h.ldlt().solve(gradient(free));
-  constexpr double longest = 1.5;  // in coordinates: a factor of 4.5 in a modulus
-  const double cut = std::min(1.0, longest / std::max(part.cwiseAbs().maxCoeff(), 1e-300));
+  const double cut = std::min(1.0, longest_step / std::max(part.cwiseAbs().maxCoeff(), 1e-300));
   for (std::size_t k = 0; k < free.size(); ++k) step[free[k]] = cut * part[static_cast<Eigen::Index>(k)];
   return parameters.clamped(u + step) - u;
 }
@@ -109,44 +124,44 @@ void weigh_again(const FreeParameters& parameters, const Metric& metric, Weighte
 
 void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
              const DescentOptions& options, WeightedFit& fit) {
-  double damping = 1e-3;
+  double damping = Damping::first;
   fit.converged = false;
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
-    const Rows rows = rows_of(fit.fit, parameters, metric);
-    const Eigen::VectorXd step = step_of(parameters, rows, fit.fit.u, damping);
+    const Rows rows = rows_of(fit.solution, parameters, metric);
+    const Eigen::VectorXd step = step_of(parameters, rows, fit.solution.u, damping);
     const double promised = fit.objective - (rows.value + rows.slope * step).squaredNorm();
     if (promised < options.settled) {
       fit.converged = true;
       return;
     }
     const simulation::ChainSolution near =
-        calibration::extrapolated(fit.fit.prediction.solution, fit.fit.linearisation.by_coordinate, step);
+        calibration::extrapolated(fit.solution.prediction.solution, fit.solution.linearisation.by_coordinate, step);
     ++fit.evaluations;
     try {
-      WeightedFit trial = predicted(evaluator, parameters, metric, fit.fit.u + step, &near);
+      WeightedFit trial = predicted(evaluator, parameters, metric, fit.solution.u + step, &near);
       if (trial.objective < fit.objective) {
         add_slopes(evaluator, parameters, trial);
         const double kept = (fit.objective - trial.objective) / promised;
         trial.evaluations = fit.evaluations;
         fit = std::move(trial);
-        damping = kept > 0.5 ? damping / 5 : damping * 2;
+        damping = kept > Damping::well_promised ? damping / 5 : damping * 2;
         continue;
       }
     } catch (const NumericalFailure&) {
       // No equilibrium there: a shorter step.
     }
-    damping = std::max(10 * damping, 0.1);
-    if (damping > 1e4) return;
+    damping = std::max(Damping::after_failure * damping, Damping::least_after_failure);
+    if (damping > Damping::given_up) return;
   }
 }
 
 double misfit_of(const WeightedFit& fit, const FreeParameters& parameters, const Metric& metric) {
-  const auto rows = metric.whitening->apply(fit.fit.residuals.distance_mm).size();
+  const auto rows = metric.whitening->apply(fit.solution.residuals.distance_mm).size();
   return fit.data / static_cast<double>(std::max<Eigen::Index>(1, rows - parameters.size()));
 }
 
 Eigen::MatrixXd information(const WeightedFit& fit, const FreeParameters& parameters, const Metric& metric) {
-  const Rows rows = rows_of(fit.fit, parameters, metric);
+  const Rows rows = rows_of(fit.solution, parameters, metric);
   return rows.slope.transpose() * rows.slope;
 }
 

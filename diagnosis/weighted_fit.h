@@ -16,9 +16,9 @@ struct Metric {
 
 /// A model at (or on its way to) the least of F(u) = ‖L⁻¹ (d(u) + mean)‖² + Σ ((u_j − m_j)/s_j)².
 struct WeightedFit {
-  calibration::Fit fit;  ///< u, prediction, mask, residuals, linearisation
-  double objective = 0;  ///< F; at the truth its data part is χ² distributed
-  double data = 0;       ///< its first part
+  calibration::Fit solution;  ///< u, prediction, mask, residuals, linearisation
+  double objective = 0;       ///< F; at the truth its data part is χ² distributed
+  double data = 0;            ///< its first part
   bool converged = false;
   int evaluations = 0;
 };

@@ -13,9 +13,9 @@ namespace {
 /// A sheet that lies @p off_mm off as a whole, of which one parameter could take away all.
 struct Shifted {
   Shifted(double off_mm, double tolerance_mm) {
-    calibration::Residuals& r = fit.fit.residuals = supine::testing::sheet(7);
+    calibration::Residuals& r = fit.solution.residuals = supine::testing::sheet(7);
     r.distance_mm.array() += off_mm;
-    fit.fit.linearisation.slope = (r.place.col(0) / 40).matrix();
+    fit.solution.linearisation.slope = (r.place.col(0) / 40).matrix();
     sources.noise_mm = r.sigma_mm;
     sources.mean_mm = Eigen::VectorXd::Zero(r.size());
     sources.modes = {{"chest_wall", Eigen::VectorXd::Constant(r.size(), tolerance_mm)}};
@@ -48,8 +48,8 @@ TEST(ErrorBudget, WhatTheFitUnderAllErrorsDoesNotTakeAwayCounts) {
   // A parameter along the very shape that is tolerated: an ordinary fit would have taken the shift away, the one under
   // all errors leaves it to its source.
   Shifted s(1.0, 1.0);
-  s.fit.fit.linearisation.slope =
-      Eigen::MatrixXd::Constant(s.fit.fit.residuals.size(), 1, 1.0) + 0.3 * (s.fit.fit.residuals.place.col(0) / 40);
+  s.fit.solution.linearisation.slope = Eigen::MatrixXd::Constant(s.fit.solution.residuals.size(), 1, 1.0) +
+                                       0.3 * (s.fit.solution.residuals.place.col(0) / 40);
   EXPECT_GT(s.budget().registration, 0.7);
   EXPECT_LT(s.budget().model_form, 0.3);
 }

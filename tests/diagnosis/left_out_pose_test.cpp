@@ -14,12 +14,12 @@ namespace {
 struct TwoPoses {
   explicit TwoPoses(double wanted_by_first, double wanted_by_second) {
     model.breast.young_modulus_kpa = {1.0, true, {}, 0.1, 10};
-    calibration::Residuals& r = fit.fit.residuals = supine::testing::sheet(5);
+    calibration::Residuals& r = fit.solution.residuals = supine::testing::sheet(5);
     r.pose.tail(r.size() - half).setOnes();
-    fit.fit.linearisation.slope = Eigen::MatrixXd::Constant(r.size(), 1, 2.0);
+    fit.solution.linearisation.slope = Eigen::MatrixXd::Constant(r.size(), 1, 2.0);
     r.distance_mm.head(half).setConstant(-2 * wanted_by_first);
     r.distance_mm.tail(r.size() - half).setConstant(-2 * wanted_by_second);
-    fit.fit.u = calibration::FreeParameters(model).start();
+    fit.solution.u = calibration::FreeParameters(model).start();
     sources.noise_mm = r.sigma_mm;
     sources.mean_mm = Eigen::VectorXd::Zero(r.size());
   }
@@ -53,17 +53,17 @@ TEST(LeftOutPose, StaysInTheRange) {
 TEST(LeftOutPose, AnErrorOfOneScanAloneIsNoReasonToStep) {
   TwoPoses poses(0, 0.5);
   // The second scan lies off as a whole, by a sigma of what is tolerated in that scan.
-  Eigen::VectorXd shape = Eigen::VectorXd::Zero(poses.fit.fit.residuals.size());
+  Eigen::VectorXd shape = Eigen::VectorXd::Zero(poses.fit.solution.residuals.size());
   shape.tail(shape.size() - TwoPoses::half).setConstant(1.0);
   poses.sources.modes = {{"registration", shape}};
-  const calibration::Residuals& r = poses.fit.fit.residuals;
+  const calibration::Residuals& r = poses.fit.solution.residuals;
   poses.model.breast.young_modulus_kpa.prior_sd = 0.05;
   EXPECT_LT(poses.rms()[0], 0.05) << "all of " << r.distance_mm.tail(1)[0] << " mm is left to the scan";
 }
 
 TEST(LeftOutPose, OnePoseAloneSaysNothing) {
   TwoPoses poses(0.1, 0.1);
-  poses.fit.fit.residuals.pose.setZero();
+  poses.fit.solution.residuals.pose.setZero();
   EXPECT_TRUE(poses.rms().empty());
 }
 
