@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Breasts that move as far as volunteers' do: how each chain ends, and how far the population moves.
 
-    bench/population.py WORK [--cases N] [--seed N] [--bin build/bin] [--jobs 2] [--rings 11] [--triangles 2500]
-                        [--slow] [--table]
+    bench/population.py WORK [--cases N] [--seed N] [--bin build/bin] [--jobs 2] [--rings 11] [--order 2]
+                        [--triangles 2500] [--slow] [--table]
 
 Draws cases (supine-phantom --population volunteers), meshes them and runs supine-simulate at the true moduli. A row of
 WORK/rows.jsonl is written as soon as a chain has ended; a call goes on from the rows that are there. --slow runs every
@@ -57,7 +57,7 @@ def draw(options, name, seed):
     if answer.exists():
         return 0, 0.0
     return run([options.bin / "supine-phantom", "--population", "volunteers", "--seed", seed, "--rings", options.rings,
-                "--voxel-mm", options.voxel_mm, "-o", options.work / "cases" / name, "--answer", answer, "--threads", 1,
+                "--order", options.order, "--voxel-mm", options.voxel_mm, "-o", options.work / "cases" / name, "--answer", answer, "--threads", 1,
                 "--force"], options.work / "logs" / f"{name}.phantom.txt", options.limit_s)
 
 
@@ -251,6 +251,7 @@ def arguments():
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/bin"))
     parser.add_argument("--jobs", type=int, default=2, help="cases side by side, one thread each")
     parser.add_argument("--rings", type=int, default=11, help="fineness of the truth")
+    parser.add_argument("--order", type=int, default=2, help="of the truth's elements")
     parser.add_argument("--voxel-mm", type=float, default=1.5)
     parser.add_argument("--triangles", type=int, default=2500, help="of the chain's mesh")
     parser.add_argument("--limit-s", type=float, default=1800, help="of every program, wall clock")

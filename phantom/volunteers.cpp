@@ -27,11 +27,11 @@ Volunteer draw_volunteer(std::uint64_t seed) {
   Random random(seed, "volunteer");
   Volunteer drawn;
   drawn.foot_radius_mm = normal_within(random, 76, 7, 55, 85);
-  drawn.height_mm = normal_within(random, 80, 16, 30, 110);
+  drawn.height_mm = normal_within(random, 80, 12, 30, 110);
   // A breast that stands higher over its foot must be stiffer to be carried at all.
   const double slender = std::log(drawn.height_mm / drawn.foot_radius_mm);
-  drawn.breast_kpa = log_normal_within(random, 0.29 * std::exp(0.8 * slender), 0.22, 0.2, 1);
-  drawn.skin_kpa = log_normal_within(random, 17 * std::exp(0.7 * slender), 0.35, 5, 40);
+  drawn.breast_kpa = log_normal_within(random, 0.29 * std::exp(1.2 * slender), 0.2, 0.2, 1);
+  drawn.skin_kpa = log_normal_within(random, 17 * std::exp(slender), 0.3, 5, 40);
   return drawn;
 }
 

@@ -80,8 +80,8 @@ TEST(Body, VolunteersLieInTheirRangesAndAreOtherBodies) {
     highest = std::max(highest, body.height_mm);
     EXPECT_EQ(body.side, draw_body(seed).side);
   }
-  EXPECT_LT(lowest, 45);
-  EXPECT_GT(highest, 105);
+  EXPECT_LT(lowest, 55);
+  EXPECT_GT(highest, 100);
 }
 
 TEST(Motion, IsThatOfAShiftedAndTurnedBody) {
