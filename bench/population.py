@@ -3,12 +3,12 @@
 """Breasts that move as far as volunteers' do: how each chain ends, and how far the population moves.
 
     bench/population.py WORK [--cases N] [--seed N] [--bin build/bin] [--jobs 2] [--rings 11] [--order 2]
-                        [--triangles 2500] [--slow] [--table]
+                        [--triangles 2500] [--chain-order 1] [--slow [--successes 40]] [--table]
 
 Draws cases (supine-phantom --population volunteers), meshes them and runs supine-simulate at the true moduli. A row of
 WORK/rows.jsonl is written as soon as a chain has ended; a call goes on from the rows that are there. --slow runs every
-failure and up to 40 certified chains again, on a finer mesh and in small load steps, into WORK/slow.jsonl. The tables
-are Markdown; --table prints them from the rows and runs nothing. Standard library only.
+failure and 40 certified chains (--successes) again, on a finer mesh and in small load steps, into WORK/slow.jsonl.
+The tables are Markdown; --table prints them from the rows and runs nothing. Standard library only.
 """
 
 import argparse
@@ -26,13 +26,13 @@ import sys
 import threading
 
 HERE = pathlib.Path(__file__).resolve().parent
-SUCCESSES_RUN_SLOWLY = 40
 FINER = 2  # times the triangles
 LOAD_STEPS = 32
 OUTCOMES = ("certificate", "several equilibria", "no equilibrium", "error")
 # 63 volunteers: median, quartiles (github.com/JialiXu12/motion-landmarks).
 VOLUNTEERS = {"nipple, prone to supine, mm": (96, 80, 118), "points inside, mm": (68, 52, 89),
-              "the same relative to the nipple, mm": (34, 21, 51), "distance to the ribs or muscle, prone, mm": (27, 15, 53),
+              "the same relative to the nipple, mm": (34, 21, 51),
+              "distance to the ribs or muscle, prone, mm": (27, 15, 53),
               "the same, supine, mm": (17, 12, 25), "distance to the skin, prone, mm": (24, 16, 33),
               "the same, supine, mm ": (25, 16, 34), "thickness there, supine over prone": (0.7, 0.6, 1.0)}
 
@@ -56,9 +56,10 @@ def draw(options, name, seed):
     answer = options.work / "answers" / f"{name}.json"
     if answer.exists():
         return 0, 0.0
-    return run([options.bin / "supine-phantom", "--population", "volunteers", "--seed", seed, "--rings", options.rings,
-                "--order", options.order, "--voxel-mm", options.voxel_mm, "-o", options.work / "cases" / name, "--answer", answer, "--threads", 1,
-                "--force"], options.work / "logs" / f"{name}.phantom.txt", options.limit_s)
+    truth = ["--rings", options.rings, "--order", options.order, "--voxel-mm", options.voxel_mm]
+    return run([options.bin / "supine-phantom", "--population", "volunteers", "--seed", seed, *truth, "-o",
+                options.work / "cases" / name, "--answer", answer, "--threads", 1, "--force"],
+               options.work / "logs" / f"{name}.phantom.txt", options.limit_s)
 
 
 def write_true_model(case, answer, target):
@@ -97,7 +98,8 @@ def chain(options, name, triangles, label):
     log = options.work / "logs" / f"{name}.{label}.txt"
     log.unlink(missing_ok=True)
     code, mesh_s = run(["make", "-f", HERE.parent / "pipeline" / "Makefile", f"BIN={options.bin}", f"CASE={case}",
-                        f"OUT={out}", f"TRIANGLES={triangles}", "THREADS=1", "mesh"], log, options.limit_s)
+                        f"OUT={out}", f"TRIANGLES={triangles}", f"ORDER={options.chain_order}", "THREADS=1", "mesh"],
+                       log, options.limit_s)
     if code != 0:
         return {"outcome": "error", "said": f"meshing: {said_of(log)}", "seconds": {"mesh": mesh_s}}
     write_true_model(case, answer, out / "truth.toml")
@@ -164,10 +166,10 @@ def run_all(work, jobs, seeds, file):
             print(f"seed {waiting[done]} done", file=sys.stderr, flush=True)
 
 
-def slow_seeds(rows):
+def slow_seeds(rows, successes):
     certified = [row["seed"] for row in rows if row["outcome"] == "certificate"]
     failed = [row["seed"] for row in rows if row["outcome"] != "certificate" and "base" in row]
-    return failed + certified[:SUCCESSES_RUN_SLOWLY]
+    return failed + certified[:successes]
 
 
 def quartiles(values):
@@ -236,8 +238,8 @@ def tell(rows, slow):
         population_table(rows)
     off = [row["landmarks_off_mm"] for row in rows if "landmarks_off_mm" in row and row["outcome"] == "certificate"]
     if len(off) > 1:
-        print("\nCertified chains: landmarks off the truth, RMS, median (quartiles) {:.1f} ({:.1f} to {:.1f}) mm.".format(
-            *quartiles(off)))
+        print("\nCertified chains: landmarks off the truth, RMS, median (quartiles) "
+              "{:.1f} ({:.1f} to {:.1f}) mm.".format(*quartiles(off)))
     failure_table(rows)
     if slow:
         slow_table(rows, slow)
@@ -254,8 +256,10 @@ def arguments():
     parser.add_argument("--order", type=int, default=2, help="of the truth's elements")
     parser.add_argument("--voxel-mm", type=float, default=1.5)
     parser.add_argument("--triangles", type=int, default=2500, help="of the chain's mesh")
+    parser.add_argument("--chain-order", type=int, default=1, help="of the chain's elements")
     parser.add_argument("--limit-s", type=float, default=1800, help="of every program, wall clock")
-    parser.add_argument("--slow", action="store_true", help="failures and 40 successes again, finer and in small steps")
+    parser.add_argument("--slow", action="store_true", help="failures and successes again, finer and in small steps")
+    parser.add_argument("--successes", type=int, default=40, help="how many of them --slow runs")
     parser.add_argument("--table", action="store_true", help="only print the tables")
     options = parser.parse_args()
     options.work, options.bin = options.work.resolve(), options.bin.resolve()
@@ -273,7 +277,7 @@ def main():
         run_all(lambda seed: one_case(options, seed), options.jobs, [s for s in wanted if s not in known], file)
         if options.slow:
             known = {row["seed"] for row in read_rows(slow_file)}
-            wanted = [seed for seed in slow_seeds(read_rows(file)) if seed not in known]
+            wanted = [seed for seed in slow_seeds(read_rows(file), options.successes) if seed not in known]
             run_all(lambda seed: slow_case(options, seed), options.jobs, wanted, slow_file)
     tell(read_rows(file), read_rows(slow_file))
 

@@ -2,6 +2,7 @@
 #include "phantom/motion.h"
 
 #include <cmath>
+#include <numbers>
 
 #include "meshing/surface/triangle_tree.h"
 #include "phantom/face_grid.h"
@@ -15,17 +16,23 @@ namespace {
 constexpr int places = 20;
 constexpr int steps = 3;  // a face is cut into steps² triangles
 
+/// A place on the foot, and how far up from muscle to skin: even over the mound's volume.
+Eigen::Vector3d place_in_mound(const Body& body, Random& random) {
+  for (;;) {
+    const double foot_radii = std::sqrt(random.uniform()), azimuth = random.uniform(0, 2 * std::numbers::pi);
+    const double share = random.uniform();
+    const Eigen::Vector2d disc(foot_radii / body.reach * std::cos(azimuth),
+                               foot_radii / body.reach * std::sin(azimuth));
+    if (random.uniform() * body.height_mm < body.thickness_mm(foot_radii)) return body.place(disc, share);
+  }
+}
+
 /// Row 0 the nipple, then the places; stress-free, LPS mm.
 Points marked_points(const Body& body, std::uint64_t seed) {
   Random random(seed, "motion");
   Points points(1 + places, 3);
   points.row(0) = body.world(body.place(Eigen::Vector2d::Zero(), 1)).transpose();
-  for (int i = 1; i <= places; ++i) {
-    Eigen::Vector3d in_ball;
-    do in_ball = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
-    while (in_ball.squaredNorm() >= 1);
-    points.row(i) = body.world(body.gland_centre + body.gland_half_axes_mm.cwiseProduct(in_ball)).transpose();
-  }
+  for (int i = 1; i <= places; ++i) points.row(i) = body.world(place_in_mound(body, random)).transpose();
   return points;
 }
 

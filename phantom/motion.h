@@ -9,7 +9,7 @@
 
 namespace supine::phantom {
 
-/// A place in the gland, followed from prone to supine as a cyst or a lymph node would be.
+/// A place in the mound, followed from prone to supine as a cyst or a lymph node would be.
 struct InnerPlace {
   double moved_mm;
   double from_nipple_mm;  ///< the same relative to the nipple
@@ -24,7 +24,7 @@ struct Motion {
 };
 
 /// @param prone, supine  nodes, LPS mm
-/// @param seed           of the places: 20, even over the gland of the stress-free body
+/// @param seed           of the places: 20, even over the volume above the foot of the stress-free body
 Motion measure_motion(const BodyMesh& body_mesh, const Body& body, const Points& prone, const Points& supine,
                       std::uint64_t seed);
 
