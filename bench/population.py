@@ -37,19 +37,24 @@ VOLUNTEERS = {"nipple, prone to supine, mm": (96, 80, 118), "points inside, mm":
               "the same, supine, mm ": (25, 16, 34), "thickness there, supine over prone": (0.7, 0.6, 1.0)}
 
 
-def run(command, log, limit_s=None):
-    """Runs to the end, output into log. Returns exit code (None: stopped at the limit) and CPU seconds."""
+def run(command, log, limit_s):
+    """Runs to the end, output into log. Returns exit code (None: stopped at the limit) and CPU seconds.
+    @raise KeyboardInterrupt  stopped from outside: the next call goes on, no row is written"""
+    stopped = threading.Event()
     with open(log, "ab") as file:
         process = subprocess.Popen([str(word) for word in command], stdout=file, stderr=file,
                                    env={**os.environ, "OMP_NUM_THREADS": "1"})
-        timer = threading.Timer(limit_s, process.terminate) if limit_s else None
-        if timer:
-            timer.start()
+        timer = threading.Timer(limit_s, lambda: (stopped.set(), process.terminate()))
+        timer.start()
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
-        if timer:
-            timer.cancel()
-    return None if process.returncode < 0 else process.returncode, usage.ru_utime + usage.ru_stime
+        timer.cancel()
+    seconds = usage.ru_utime + usage.ru_stime
+    if process.returncode >= 0 and process.returncode != 130:
+        return process.returncode, seconds
+    if not stopped.is_set():
+        raise KeyboardInterrupt
+    return None, seconds
 
 
 def draw(options, name, seed):
@@ -226,8 +231,8 @@ def slow_table(rows, slow):
         both = "nipple" in default and "nipple" in finer
         apart = f"{math.dist(default['nipple'], finer['nipple']):.1f}" if both else "–"
         nodes = f"{steps['apart_mm']:.1e}" if steps.get("apart_mm") is not None else "–"
-        print(f"| {row['seed']} | {default['outcome']} | {finer['outcome']} | {apart} | {steps.get('outcome', '–')} | "
-              f"{nodes} |")
+        cells = [row["seed"], default["outcome"], finer["outcome"], apart, steps.get("outcome", "–"), nodes]
+        print("| " + " | ".join(map(str, cells)) + " |")
 
 
 def tell(rows, slow):
