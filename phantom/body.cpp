@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "phantom/random.h"
+#include "phantom/volunteers.h"
 
 namespace supine::phantom {
 
@@ -90,7 +91,7 @@ void draw_organs(Body& body, Random& random) {
 
 }  // namespace
 
-Body draw_body(std::uint64_t seed) {
+Body draw_body(std::uint64_t seed, Population population) {
   Random random(seed, "body");
   Body body;
   body.side = random.uniform() < 0.5 ? "left" : "right";
@@ -112,6 +113,15 @@ Body draw_body(std::uint64_t seed) {
   body.pitch_rad = random.uniform(-0.12, 0.12);
   const double outer = body.side == "left" ? 1 : -1;
   body.centre_mm = {outer * random.uniform(70, 100), random.uniform(-75, -45), random.uniform(-40, 40)};
+  if (population == Population::volunteers) {
+    const Volunteer volunteer = draw_volunteer(seed);
+    body.foot_radius_mm = volunteer.foot_radius_mm;
+    body.height_mm = volunteer.height_mm;
+    body.breast_kpa = volunteer.breast_kpa;
+    body.skin_kpa = volunteer.skin_kpa;
+    draw_organs(body, random);
+    return body;
+  }
   draw_organs(body, random);
   body.breast_kpa = random.log_uniform(0.45, 0.9);
   body.skin_kpa = random.log_uniform(11, 27);

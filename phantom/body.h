@@ -49,7 +49,13 @@ struct Body {
   std::map<std::string, double> numbers() const;  ///< for the answer
 };
 
+/// Whose breasts are drawn.
+enum class Population {
+  benchmark,  ///< that of docs/hidden.md: the nipple moves a third as far as volunteers' does
+  volunteers  ///< size and stiffness by draw_volunteer()
+};
+
 /// Draws one; the distribution stands in docs/supine-phantom.md.
-Body draw_body(std::uint64_t seed);
+Body draw_body(std::uint64_t seed, Population population = Population::benchmark);
 
 }  // namespace supine::phantom

@@ -64,7 +64,7 @@ const simulation::Mechanics& Truth::in(const TruthPose& pose) {
   return mechanics_;
 }
 
-void Truth::solve(std::vector<TruthPose>& poses) {
+void Truth::solve(std::vector<TruthPose>& poses, Start start) {
   simulation::SolveOptions options;
   options.step_tolerance_mm = 1e-6;
   options.residual_tolerance = 1e-9;
@@ -72,7 +72,9 @@ void Truth::solve(std::vector<TruthPose>& poses) {
   for (TruthPose& pose : poses) {
     in(pose);
     solver.forget();
-    solver.forward(body_mesh_.mesh.points, pose.x, "undeformed → " + pose.name);
+    const Points near = pose.x;
+    solver.forward(body_mesh_.mesh.points, pose.x, "undeformed → " + pose.name,
+                   start == Start::shapes ? &near : nullptr);
   }
 }
 

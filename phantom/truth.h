@@ -34,9 +34,11 @@ class Truth {
   simulation::Fields<double> fields(const TruthPose& pose) const;
   /// The mechanics of one pose, until the next is asked for.
   const simulation::Mechanics& in(const TruthPose& pose);
-  /// Lets the body hang prone and lie in the other poses: one forward solve each, from no load.
+  enum class Start { no_load, shapes };
+  /// Lets the body hang prone and lie in the other poses: one forward solve each.
+  /// @param start  from no load, or from the shapes that the poses have
   /// @throws NumericalFailure  no equilibrium
-  void solve(std::vector<TruthPose>& poses);
+  void solve(std::vector<TruthPose>& poses, Start start = Start::no_load);
 
  private:
   const BodyMesh& body_mesh_;

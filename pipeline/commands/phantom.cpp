@@ -13,6 +13,9 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+const std::map<std::string, phantom::Population> populations = {{"benchmark", phantom::Population::benchmark},
+                                                                {"volunteers", phantom::Population::volunteers}};
+
 class PhantomTool : public Tool {
  public:
   std::string name() const override { return "supine-phantom"; }
@@ -36,6 +39,10 @@ class PhantomTool : public Tool {
     app.add_option("--outside", options_.outside,
                    fmt::format("a cause that is not in the catalogue: {}", fmt::join(phantom::outside_causes(), ", ")));
     app.add_option("--size", options_.size, "of every cause: 0 to 1 in the range it has; default: drawn");
+    app.add_option("--population", population_,
+                   "whose breasts: benchmark, or volunteers, whose nipples move three times as far")
+        ->check(CLI::IsMember({"benchmark", "volunteers"}))
+        ->capture_default_str();
     app.add_flag(
         "--realistic", options_.realistic,
         "with what patients bring and no model has: patchy tissue and skin, a muscle that lies elsewhere, mild "
@@ -59,6 +66,7 @@ class PhantomTool : public Tool {
     const fs::path folder = case_folder();
     const fs::path answer = answer_file(folder);
     take_effects();
+    options_.population = populations.at(population_);
     // Known at once, not after the work.
     for (const fs::path& file : {folder / "case.toml", answer})
       if (!run.force() && fs::exists(file))
@@ -149,6 +157,23 @@ class PhantomTool : public Tool {
     if (phantom.discrepancy) f["discrepancy"] = discrepancy_figures(phantom);
   }
 
+  /// What breasts of volunteers are drawn for.
+  static Json motion_figures(const phantom::Motion& motion) {
+    Json figures{{"nipple_mm", vector_figures(motion.nipple_mm)}, {"nipple_moved_mm", motion.nipple_mm.norm()}};
+    for (const phantom::InnerPlace& place : motion.inside)
+      figures["inside"].push_back({{"moved_mm", place.moved_mm},
+                                   {"from_nipple_mm", place.from_nipple_mm},
+                                   {"muscle_mm", place.muscle_mm},
+                                   {"skin_mm", place.skin_mm}});
+    return figures;
+  }
+
+  void add_population(const phantom::Phantom& phantom, Json& f) const {
+    f["population"] = population_;
+    f["gave_way"] = phantom.gave_way;
+    f["motion"] = motion_figures(phantom.motion);
+  }
+
   Json figures(const fs::path& folder, const phantom::Phantom& phantom) const {
     Json f;
     f["case"] = folder.filename().string();
@@ -156,6 +181,7 @@ class PhantomTool : public Tool {
     f["causes"] = Json::array();
     for (const phantom::Cause& cause : phantom.causes) f["causes"].push_back(cause_figures(cause));
     if (options_.size) f["size"] = *options_.size;
+    if (options_.population != phantom::Population::benchmark) add_population(phantom, f);
     if (phantom.nuisances) add_nuisances(phantom, f);
     f["base"] = {{"breast.young_modulus_kpa", phantom.body.breast_kpa},
                  {"skin.young_modulus_kpa", phantom.body.skin_kpa}};
@@ -174,6 +200,7 @@ class PhantomTool : public Tool {
   }
 
   phantom::PhantomOptions options_;
+  std::string population_ = "benchmark";
   std::vector<std::string> effects_;
   fs::path answer_;
 };

@@ -52,6 +52,56 @@ TEST(Body, SeedsDifferAndMeshesStandOnTheMuscle) {
   EXPECT_TRUE(left && right);
 }
 
+// Cases that were made before must be made again: what the benchmark draws does not change.
+TEST(Body, BenchmarkStaysAsItWas) {
+  const Body body = draw_body(3);
+  EXPECT_EQ(body.side, "left");
+  EXPECT_NEAR(body.foot_radius_mm, 64.19032937274791, 1e-12);
+  EXPECT_NEAR(body.height_mm, 38.6573484753337, 1e-12);
+  EXPECT_NEAR(body.yaw_rad, 0.2330994133404684, 1e-12);
+  EXPECT_NEAR(body.tumour_radius_mm, 7.573153567383695, 1e-12);
+  EXPECT_NEAR(body.breast_kpa, 0.4896654702184056, 1e-12);
+  EXPECT_NEAR(body.skin_kpa, 14.087915140113026, 1e-12);
+}
+
+TEST(Body, VolunteersLieInTheirRangesAndAreOtherBodies) {
+  double lowest = 1e3, highest = 0;
+  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+    const Body body = draw_body(seed, Population::volunteers);
+    const auto within = [seed](double value, double lower, double upper) {
+      EXPECT_GE(value, lower) << "seed " << seed;
+      EXPECT_LE(value, upper) << "seed " << seed;
+    };
+    within(body.foot_radius_mm, 55, 85);
+    within(body.height_mm, 30, 110);
+    within(body.breast_kpa, 0.2, 1);
+    within(body.skin_kpa, 5, 40);
+    lowest = std::min(lowest, body.height_mm);
+    highest = std::max(highest, body.height_mm);
+    EXPECT_EQ(body.side, draw_body(seed).side);
+  }
+  EXPECT_LT(lowest, 55);
+  EXPECT_GT(highest, 100);
+}
+
+TEST(Motion, IsThatOfAShiftedAndTurnedBody) {
+  const Body body = draw_body(3, Population::volunteers);
+  const BodyMesh made = mesh_body(body, 3, coarse_rings, 1);
+  const Points& rest = made.mesh.points;
+  const Eigen::RowVector3d shift(3, 4, 12);
+  const Motion shifted = measure_motion(made, body, rest, rest.rowwise() + shift, 3);
+  const double outer = body.side == "left" ? 1 : -1;
+  EXPECT_LT((shifted.nipple_mm - Eigen::Vector3d(3 * outer, 4, 12)).norm(), 1e-9);
+  EXPECT_EQ(shifted.inside.size(), 20u);
+  for (const InnerPlace& place : shifted.inside) {
+    EXPECT_NEAR(place.moved_mm, 13, 1e-9);
+    EXPECT_NEAR(place.from_nipple_mm, 0, 1e-9);
+    EXPECT_NEAR(place.skin_mm[0], place.skin_mm[1], 1e-9);
+    EXPECT_GT(place.muscle_mm[0], -0.1);
+    EXPECT_LT(place.muscle_mm[0] + place.skin_mm[0], 1.01 * body.height_mm);
+  }
+}
+
 TEST(Causes, AreDrawnWithinTheCataloguesRanges) {
   for (const std::string& name : catalogue_causes()) {
     const simulation::Effect* effect = simulation::find_effect(name);

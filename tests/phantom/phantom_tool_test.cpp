@@ -103,6 +103,27 @@ TEST(PhantomTool, PriorDrawsEverythingItself) {
   EXPECT_TRUE(answer["neither_right_nor_wrong"].empty());
 }
 
+// The population changes the body alone; the benchmark's cases are those made without the option.
+TEST(PhantomTool, PopulationIsSaidInTheAnswer) {
+  TemporaryFolder folder;
+  const fs::path plain = folder / "plain/case-001", benchmark = folder / "benchmark/case-001";
+  ASSERT_EQ(phantom(plain, {"--seed", "4"}).code, 0);
+  ASSERT_EQ(phantom(benchmark, {"--seed", "4", "--population", "benchmark"}).code, 0);
+  for (const std::string& file : files_in(plain))
+    EXPECT_EQ(read_text(plain / file), read_text(benchmark / file)) << file;
+  EXPECT_FALSE(Json::parse(read_text(folder / "plain/answers/case-001.json")).contains("population"));
+  const Finished made = phantom(folder / "wide/case-001", {"--seed", "4", "--population", "volunteers", "--realistic"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  for (const char* file : {"case.toml", "model.toml"})
+    EXPECT_EQ(read_text(folder / "wide/case-001" / file), read_text(plain / file)) << file;
+  const Json answer = Json::parse(read_text(folder / "wide/answers/case-001.json"));
+  EXPECT_EQ(answer["population"], "volunteers");
+  EXPECT_EQ(answer["drawn"], "realistic");
+  EXPECT_TRUE(answer["gave_way"].is_array());
+  EXPECT_EQ(answer["motion"]["inside"].size(), 20u);
+  EXPECT_GT(answer["motion"]["nipple_moved_mm"], 40);
+}
+
 struct BadCall {
   Words options;
   std::string says;
@@ -114,6 +135,7 @@ TEST(PhantomTool, RefusesInOneMessageAndWritesNothing) {
   for (const BadCall& bad :
        {BadCall{{"--effect", "gremlins"}, "no cause 'gremlins'"},
         BadCall{{"--effect", "null", "--effect", "creep"}, "null"}, BadCall{{"--noise-mm", "-1"}, "noise_mm"},
+        BadCall{{"--population", "martians"}, "--population"},
         BadCall{{"--prior", "--effect", "null"}, "--prior excludes --effect"},
         BadCall{{"--prior", "--realistic"}, "--prior excludes --realistic"},
         BadCall{{"--size", "0.5", "--effect", "misregistration"}, "'misregistration' is normal"},

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "phantom/volunteers.h"
+
+#include <cmath>
+
+#include "phantom/random.h"
+
+namespace supine::phantom {
+namespace {
+
+/// Normal, drawn again outside the range.
+double normal_within(Random& random, double mean, double sd, double lower, double upper) {
+  double value = 0;
+  do value = mean + sd * random.normal();
+  while (value < lower || value > upper);
+  return value;
+}
+
+/// Log-normal about a median, drawn again outside the range.
+double log_normal_within(Random& random, double median, double log_sd, double lower, double upper) {
+  return std::exp(normal_within(random, std::log(median), log_sd, std::log(lower), std::log(upper)));
+}
+
+}  // namespace
+
+Volunteer draw_volunteer(std::uint64_t seed) {
+  Random random(seed, "volunteer");
+  Volunteer drawn;
+  drawn.foot_radius_mm = normal_within(random, 76, 7, 55, 85);
+  drawn.height_mm = normal_within(random, 80, 12, 30, 110);
+  // A breast that stands higher over its foot must be stiffer to be carried at all.
+  const double slender = std::log(drawn.height_mm / drawn.foot_radius_mm);
+  drawn.breast_kpa = log_normal_within(random, 0.29 * std::exp(1.2 * slender), 0.2, 0.2, 1);
+  drawn.skin_kpa = log_normal_within(random, 17 * std::exp(slender), 0.3, 5, 40);
+  return drawn;
+}
+
+}  // namespace supine::phantom
