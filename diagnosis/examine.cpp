@@ -83,20 +83,20 @@ void fit_base(const Subject& subject, calibration::Evaluator& evaluator, const E
   const FreeParameters parameters(subject.model);
   fit_from(subject, evaluator, parameters, parameters.start(), subject.near, options, found);
   // Where something is missing a calibration may end at moduli no body has: errors measured there are not the body's.
-  if (farthest_modulus(parameters, found.base.fit.u) > far_from_given) {
-    const calibration::Fit first = std::move(found.base.fit);
+  if (farthest_modulus(parameters, found.base.solution.u) > far_from_given) {
+    const calibration::Fit first = std::move(found.base.solution);
     fit_from(subject, evaluator, parameters, first.u, &first.prediction.solution, options, found);
   }
   tell(options, "catalogue");
-  found.model = parameters.model(found.base.fit.u);
+  found.model = parameters.model(found.base.solution.u);
   found.free = parameters.names();
   found.unseen.clear();
-  found.candidates = find_candidates(evaluator, found.model, found.base.fit, found.unseen);
+  found.candidates = find_candidates(evaluator, found.model, found.base.solution, found.unseen);
 }
 
 void judge_base(const Subject& subject, Findings& found) {
   const FreeParameters parameters(subject.model);
-  const calibration::Fit& fit = found.base.fit;
+  const calibration::Fit& fit = found.base.solution;
   BaseFigures& f = found.figures;
   f.rms_mm = rms(fit.residuals.distance_mm);
   f.held_out_rms_mm =
@@ -179,7 +179,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   find_secants(problem, found->candidates);
   tell(options, "scores");
   found->table =
-      score_candidates(found->base.fit.residuals, found->sources.mean_mm, found->base.fit.linearisation.slope,
+      score_candidates(found->base.solution.residuals, found->sources.mean_mm, found->base.solution.linearisation.slope,
                        found->candidates, found->whitening, options.seed);
   judge_base(subject, *found);
   const bool quiet = is_quiet(*found, options.rules);

@@ -65,15 +65,15 @@ class Profile {
 
   /// @return infinity where there is no equilibrium
   double rise(double step) const {
-    Eigen::VectorXd u = least_.fit.u + step * others_;
-    u[which_] = least_.fit.u[which_] + step;
+    Eigen::VectorXd u = least_.solution.u + step * others_;
+    u[which_] = least_.solution.u[which_] + step;
     u = parameters_.clamped(u);
     const FreeParameters rest = with_one_held(u[which_]);
     Eigen::VectorXd start(rest.size());
     for (Eigen::Index i = 0; i < start.size(); ++i) start[i] = u[i < which_ ? i : i + 1];
     try {
       calibration::Evaluator evaluator(scene_, rest.base(), accurate_enough());
-      WeightedFit fit = weigh(evaluator, rest, metric_, start, &least_.fit.prediction.solution);
+      WeightedFit fit = weigh(evaluator, rest, metric_, start, &least_.solution.prediction.solution);
       DescentOptions few;
       few.max_iterations = 2;
       descend(evaluator, rest, metric_, few, fit);
@@ -125,7 +125,7 @@ FittedParameter profiled(const calibration::MeasuredScene& scene, const Metric& 
                          const FreeParameters& parameters, const WeightedFit& least, Eigen::Index i,
                          const FittedParameter& linear) {
   const Profile profile(scene, metric, parameters, least, i);
-  const double u = least.fit.u[i];
+  const double u = least.solution.u[i];
   const double height = chi_squared_quantile(1, 0.95) * std::max(1.0, misfit_of(least, parameters, metric));
   const double variance = covariance_of(information(least, parameters, metric))(i, i);
   const double reach = std::sqrt(height * variance);

@@ -11,7 +11,7 @@ namespace supine::diagnosis {
 namespace {
 
 RungFigures figures_of(const Findings& found, const std::string& added) {
-  return {added, found.base.fit.residuals.distance_mm.cwiseAbs().mean(), found.figures.rms_mm,
+  return {added, found.base.solution.residuals.distance_mm.cwiseAbs().mean(), found.figures.rms_mm,
           found.figures.held_out_rms_mm, found.figures.pose_rms_mm};
 }
 

@@ -49,7 +49,7 @@ struct Slopes {
 };
 
 Slopes present(const Findings& found, const std::vector<const Candidate*>& effects) {
-  Slopes slopes{found.whitening.apply(found.base.fit.linearisation.slope), {}};
+  Slopes slopes{found.whitening.apply(found.base.solution.linearisation.slope), {}};
   for (const Candidate* effect : effects) slopes.effect.push_back(found.whitening.apply(effect->slope));
   return slopes;
 }
@@ -61,7 +61,7 @@ class Pose {
       : found_(found),
         load_{option.name, option.down},
         chain_(*subject.fitted.mesh, *subject.fitted.anatomy, found.model, {subject.fitted.prone, load_}) {
-    simulation::ChainSolution near = found.base.fit.prediction.solution;
+    simulation::ChainSolution near = found.base.solution.prediction.solution;
     near.poses.resize(1);
     near.poses[0].name = option.name;
     solution_ = chain_.solve(found.model, &near);
@@ -89,8 +89,8 @@ class Pose {
   /// Noise of as many points per node as the fitted scan has, what the mesh does, and the scan's own place.
   void factorise() {
     const Eigen::Index n = place_.rows();
-    const auto scans = found_.base.fit.prediction.poses.size();
-    const double points = static_cast<double>(found_.base.fit.residuals.size()) / static_cast<double>(scans * n);
+    const auto scans = found_.base.solution.prediction.poses.size();
+    const double points = static_cast<double>(found_.base.solution.residuals.size()) / static_cast<double>(scans * n);
     const double nugget = found_.sources.noise_mm.squaredNorm() / static_cast<double>(found_.sources.noise_mm.size()) /
                           std::max(1.0, points);
     const double shared = found_.sources.spread_mm * found_.sources.spread_mm;
@@ -123,7 +123,7 @@ Slopes further(const Subject& subject, const Findings& found, const Option& opti
   if (option.again) return now;
   Pose pose(subject, found, option);
   const calibration::FreeParameters parameters(found.model);
-  const Eigen::VectorXd unit = parameters.slope(found.base.fit.u);
+  const Eigen::VectorXd unit = parameters.slope(found.base.solution.u);
   const auto rows = pose.slope(found.free.empty() ? std::string() : found.free[0]).size();
   Slopes slopes{Eigen::MatrixXd(rows, parameters.size()), {}};
   for (Eigen::Index i = 0; i < parameters.size(); ++i)

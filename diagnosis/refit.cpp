@@ -77,9 +77,9 @@ Job prepared(const RefitProblem& problem, const Candidate& candidate, const Scor
     usual.emplace_back(p.name, std::clamp(p.null + sign * p.typical, p.lower, p.upper));
     differ |= std::abs(cut - usual.back().second) > 0.5 * p.typical;
   }
-  job.starts.push_back(start_at(*job.parameters, base, problem.base->fit.u, step));
+  job.starts.push_back(start_at(*job.parameters, base, problem.base->solution.u, step));
   if (differ && candidate.parameters.size() == 1)
-    job.starts.push_back(start_at(*job.parameters, base, problem.base->fit.u, usual));
+    job.starts.push_back(start_at(*job.parameters, base, problem.base->solution.u, usual));
   // Without strength a place moves nothing, and at the wrong place a one-sided strength falls to nothing and stays
   // there: look on either side too.
   const bool falls = std::any_of(candidate.parameters.begin(), candidate.parameters.end(),
@@ -90,7 +90,7 @@ Job prepared(const RefitProblem& problem, const Candidate& candidate, const Scor
     for (const double side : {-place_start_sd, place_start_sd}) {
       auto elsewhere = usual;
       elsewhere.emplace_back(candidate.effect + "." + row.name, row.median + side * row.spread);
-      job.starts.push_back(start_at(*job.parameters, base, problem.base->fit.u, elsewhere));
+      job.starts.push_back(start_at(*job.parameters, base, problem.base->solution.u, elsewhere));
     }
   }
   return job;
@@ -104,11 +104,11 @@ void weigh_under_all_errors(const RefitProblem& problem, Job& job) {
 
 /// The better of the starts, and a few steps from there.
 void begin(const RefitProblem& problem, Job& job) {
-  job.whitening = Whitening::of(problem.base->fit.residuals, without_tolerance_for(job.effect, *problem.sources));
+  job.whitening = Whitening::of(problem.base->solution.residuals, without_tolerance_for(job.effect, *problem.sources));
   job.metric = *problem.metric;
   job.metric.whitening = &job.whitening;
   job.evaluator = std::make_unique<calibration::Evaluator>(problem.scene, job.model, accurate_enough());
-  const simulation::ChainSolution& near = problem.base->fit.prediction.solution;
+  const simulation::ChainSolution& near = problem.base->solution.prediction.solution;
   for (const Eigen::VectorXd& u : job.starts) {
     try {
       WeightedFit trial = weigh(*job.evaluator, *job.parameters, job.metric, u, &near);

@@ -7,7 +7,7 @@
 namespace supine::diagnosis {
 
 void find_secants(const RefitProblem& problem, std::vector<Candidate>& candidates) {
-  const calibration::Fit& base = problem.base->fit;
+  const calibration::Fit& base = problem.base->solution;
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     const auto& rows = candidates[c].parameters;

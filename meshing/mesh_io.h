@@ -11,6 +11,9 @@
 
 namespace supine::meshing {
 
+/// Named arrays of a file: one row per point, or per cell.
+using NamedTables = std::vector<std::pair<std::string, Table>>;
+
 /// Writes @p mesh as .vtu: the tetrahedra, then the boundary triangles, as cells of one grid (linear or quadratic,
 /// VTK node order). Cell arrays `tissue` (-1 on triangles), `fraction_<tissue>` of the meshed tissues, `region`
 /// (0 on tetrahedra); field data `frame` = LPS, `unit` = mm, `tissue_names`, `region_names`, the muscle sheet as

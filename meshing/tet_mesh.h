@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "common/arrays.h"
 #include "reconstruction/surface.h"
 #include "segmentation/tissue.h"
 
 namespace supine::meshing {
-
-/// Named arrays of a file: one row per point, or per cell.
-using NamedTables = std::vector<std::pair<std::string, Table>>;
 
 /// A tagged tetrahedral mesh of everything but the muscle; mm, LPS.
 ///

@@ -6,11 +6,11 @@
 #include <optional>
 #include <string>
 
-#include "meshing/tet_mesh.h"
+#include "meshing/mesh_io.h"
 
 namespace supine::meshing {
 
-/// A .vtu file of tetrahedra and boundary triangles, opened; mesh_io.h says what it must hold.
+/// A .vtu file of tetrahedra and boundary triangles, opened; see mesh_io.h for what it must hold.
 class VtuReader {
  public:
   /// @throws InputError  not there, not a readable .vtu, another frame or unit

@@ -122,7 +122,7 @@ Json forces_json(const Findings& found) {
   const Eigen::VectorXd size = map.force_kpa.rowwise().norm();
   Eigen::Index place;
   const double largest = size.maxCoeff(&place);
-  const auto at = found.base.fit.residuals.place.row(place);
+  const auto at = found.base.solution.residuals.place.row(place);
   return {{"meaning", "a hint, no diagnosis"},
           {"largest_kpa", largest},
           {"largest_at_mm", {at[0], at[1], at[2]}},
@@ -266,8 +266,8 @@ DiagnosisResult complete(const MeasuredCase& measured, std::unique_ptr<Findings>
   const Findings& f = *result.found;
   const auto areas = calibration::anatomical_areas(measured.mesh, measured.anatomy);
   for (std::size_t m = 0; m < measured.fitted.size(); ++m) {
-    const calibration::ModelSkin skin(measured.mesh, f.base.fit.prediction.solution.poses[m].x);
-    const auto error = diagnosis::skin_error(skin, f.base.fit.residuals, f.base.fit.prediction, m);
+    const calibration::ModelSkin skin(measured.mesh, f.base.solution.prediction.solution.poses[m].x);
+    const auto error = diagnosis::skin_error(skin, f.base.solution.residuals, f.base.solution.prediction, m);
     const auto spots = diagnosis::find_hot_spots(skin, error, areas, measured.fitted[m].pose.name);
     result.hot_spots.insert(result.hot_spots.end(), spots.begin(), spots.end());
   }
@@ -291,7 +291,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
     if (std::none_of(found.refits.begin(), found.refits.end(),
                      [&score](const Refit& r) { return r.effect == score.effect; }))
       f["candidates"].push_back(candidate_json(found, score));
-  f["base_mae_mm"] = found.base.fit.residuals.distance_mm.cwiseAbs().mean();
+  f["base_mae_mm"] = found.base.solution.residuals.distance_mm.cwiseAbs().mean();
   f["base_rms_mm"] = found.figures.rms_mm;
   f["base_held_out_rms_mm"] = found.figures.held_out_rms_mm;
   f["base_held_out_pose_rms_mm"] = number_or_null(found.figures.pose_rms_mm);
@@ -301,7 +301,8 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["base_parameters"] = Json::object();
   const calibration::FreeParameters parameters(found.model);
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
-    f["base_parameters"][parameters.names()[static_cast<std::size_t>(i)]] = parameters.value(i, found.base.fit.u[i]);
+    f["base_parameters"][parameters.names()[static_cast<std::size_t>(i)]] =
+        parameters.value(i, found.base.solution.u[i]);
   f["left_before"] = left_json(found.figures.left);
   f["left_after"] = left_json(found.diagnosis.left);
   f["budget_mm"] = budget_json(found.budget);
@@ -339,7 +340,7 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result) {
   run.say(
       fmt::format("  residual: MAE {:.2f} mm, RMS {:.2f}, held-out {:.2f}; scan noise {:.2f}, registration {:.2f}, "
                   "numerical {:.2f}, parameters {:.2f}, model {:.2f}",
-                  found.base.fit.residuals.distance_mm.cwiseAbs().mean(), b.total, found.figures.held_out_rms_mm,
+                  found.base.solution.residuals.distance_mm.cwiseAbs().mean(), b.total, found.figures.held_out_rms_mm,
                   b.noise, b.registration, b.numerical, b.parameters, b.model_form));
   run.say("  where:    " + where(result.hot_spots));
   say_verdict(run, found);
@@ -352,19 +353,19 @@ void write_diagnosis_files(Run& run, const MeasuredCase& measured, const Diagnos
   std::vector<std::pair<std::string, Eigen::VectorXd>> shapes;
   for (const Score& score : found.table.scores) {
     const auto& candidate = candidate_of(found, score.effect);
-    Eigen::VectorXd shape = Eigen::VectorXd::Zero(found.base.fit.residuals.size());
+    Eigen::VectorXd shape = Eigen::VectorXd::Zero(found.base.solution.residuals.size());
     for (Eigen::Index k = 0; k < score.step.size(); ++k)
       shape += (score.step[k] - candidate.parameters[static_cast<std::size_t>(k)].null) * candidate.slope.col(k);
     shapes.emplace_back(score.effect, shape);
   }
   std::vector<std::string> poses;
   for (const auto& m : measured.fitted) poses.push_back(m.pose.name);
-  diagnosis::write_diagnosis(found.base.fit.residuals, poses, shapes, found.forces ? &*found.forces : nullptr,
+  diagnosis::write_diagnosis(found.base.solution.residuals, poses, shapes, found.forces ? &*found.forces : nullptr,
                              run.output(folder / "diagnosis.vtp"));
   const auto areas = calibration::anatomical_areas(measured.mesh, measured.anatomy);
   for (std::size_t m = 0; m < measured.fitted.size(); ++m) {
-    const calibration::ModelSkin skin(measured.mesh, found.base.fit.prediction.solution.poses[m].x);
-    const auto error = diagnosis::skin_error(skin, found.base.fit.residuals, found.base.fit.prediction, m);
+    const calibration::ModelSkin skin(measured.mesh, found.base.solution.prediction.solution.poses[m].x);
+    const auto error = diagnosis::skin_error(skin, found.base.solution.residuals, found.base.solution.prediction, m);
     const fs::path file = folder / fmt::format("error_map_{}.vtp", poses[m]);
     diagnosis::write_error_map(skin, error, areas, run.output(file));
   }

@@ -116,14 +116,14 @@ TEST_F(NullTwin, TheLessIsKnownOfWhereAScanLiesTheLessAFurtherOneSeparates) {
 
 TEST_F(NullTwin, TheHotSpotIsWhereTheDistanceIs) {
   constexpr double depth_mm = -2, radius_mm = 30;
-  const calibration::ModelSkin skin(twin->mesh, found->base.fit.prediction.solution.poses[0].x);
-  calibration::Residuals r = found->base.fit.residuals;
+  const calibration::ModelSkin skin(twin->mesh, found->base.solution.prediction.solution.poses[0].x);
+  calibration::Residuals r = found->base.solution.residuals;
   Eigen::Index top;
   r.q.rowwise().squaredNorm().minCoeff(&top);  // the middle of the mound
   const Eigen::RowVector3d centre = r.place.row(top);
   for (Eigen::Index i = 0; i < r.size(); ++i)
     r.distance_mm[i] = (r.place.row(i) - centre).norm() < radius_mm ? depth_mm : 0.0;
-  const auto spots = find_hot_spots(skin, skin_error(skin, r, found->base.fit.prediction, 0), {}, "supine");
+  const auto spots = find_hot_spots(skin, skin_error(skin, r, found->base.solution.prediction, 0), {}, "supine");
   ASSERT_EQ(spots.size(), 1u);
   // The rim is smoothed over an edge of this coarse skin.
   EXPECT_LT(spots[0].mean_signed_mm, 0.5 * depth_mm);
@@ -134,10 +134,10 @@ TEST_F(NullTwin, TheHotSpotIsWhereTheDistanceIs) {
 }
 
 TEST_F(NullTwin, NoHotSpotWithoutDistance) {
-  const calibration::ModelSkin skin(twin->mesh, found->base.fit.prediction.solution.poses[0].x);
-  calibration::Residuals r = found->base.fit.residuals;
+  const calibration::ModelSkin skin(twin->mesh, found->base.solution.prediction.solution.poses[0].x);
+  calibration::Residuals r = found->base.solution.residuals;
   r.distance_mm.setZero();
-  EXPECT_TRUE(find_hot_spots(skin, skin_error(skin, r, found->base.fit.prediction, 0), {}, "supine").empty());
+  EXPECT_TRUE(find_hot_spots(skin, skin_error(skin, r, found->base.solution.prediction, 0), {}, "supine").empty());
 }
 
 TEST(TwinDiagnosis, ALigamentIsAmongWhatIsNamedAndAnotherScanBearsItOut) {
