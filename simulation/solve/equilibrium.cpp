@@ -282,7 +282,7 @@ bool EquilibriumSolver::search_line(const Problem& problem, const Attempt& attem
 /// Takes q from the shape, where the problem is one that follows it.
 void EquilibriumSolver::start_volume(const Problem& problem, const Points& sought) {
   volume_strain_.resize(0);
-  if (problem.unknown != Unknown::deformed || !mechanics_.has_energy() || !mechanics_.volume().averages_volume())
+  if (problem.unknown != Unknown::deformed || !mechanics_.has_energy() || !mechanics_.volume().nearly_incompressible())
     return;
   Eigen::VectorXd none;
   mechanics_.volume().volume_strain(state_of(problem, sought), none, volume_strain_, none);

@@ -235,8 +235,10 @@ void BulkTerm<Element>::add_parameter_derivative(const State& state, const Field
 }
 
 template <class Element>
-bool BulkTerm<Element>::averages_volume() const {
-  return std::any_of(material_.begin(), material_.end(), [](const auto& m) { return m.excess > 0; });
+bool BulkTerm<Element>::nearly_incompressible() const {
+  constexpr double many_shear_moduli = 20;
+  return std::any_of(material_.begin(), material_.end(),
+                     [](const auto& m) { return m.excess > many_shear_moduli * m.point.mu_kpa; });
 }
 
 template <class Element>

@@ -49,7 +49,7 @@ class BulkTerm : public Term, public VolumeStrainTerm {
   void add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const override;
   bool has_energy() const override { return settings_.law != BulkLaw::corotational_qr; }
 
-  bool averages_volume() const override;
+  bool nearly_incompressible() const override;
   void volume_strain(const State& state, const Eigen::VectorXd& step, Eigen::VectorXd& strain,
                      Eigen::VectorXd& change) const override;
   void take_off_pressure_defect(const State& state, Eigen::VectorXd& residual) const override;
