@@ -80,6 +80,7 @@ Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anato
   pattern_ = std::make_unique<Pattern>(mesh.cells, mesh.points.rows());
   terms_ = mesh.order() == 2 ? make_terms<Tet10, Tri6>(mesh, anatomy, model, layout_, *pattern_)
                              : make_terms<Tet4, Tri3>(mesh, anatomy, model, layout_, *pattern_);
+  volume_ = dynamic_cast<const VolumeStrainTerm*>(terms_.front().get());
   const auto hold_group = [this, &mesh](const FaceGroup& group) {
     for (const int face : group.faces)
       for (const int node : mesh.faces.row(face)) held_[node] = 1;

@@ -7,7 +7,7 @@
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
 #include "simulation/model.h"
-#include "simulation/terms/term.h"
+#include "simulation/terms/volume_strain.h"
 
 namespace supine::simulation {
 
@@ -31,6 +31,9 @@ class Mechanics {
   /// Fills @p sums with what is demanded; rows and columns of held nodes become those of the identity.
   void evaluate(const State& state, const Demand& demand, Sums& sums) const;
 
+  /// The tissue's resistance to a change of each cell's whole volume.
+  const VolumeStrainTerm& volume() const { return *volume_; }
+
   /// ∂r/∂p at frozen x and X, mN per unit of p; zero at held nodes.
   void parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const;
 
@@ -42,7 +45,8 @@ class Mechanics {
   Layout layout_;
   std::unique_ptr<Pattern> pattern_;
   std::vector<std::unique_ptr<Term>> terms_;
-  std::vector<char> held_;  // per node
+  const VolumeStrainTerm* volume_ = nullptr;  // one of the terms
+  std::vector<char> held_;                    // per node
   bool any_held_ = false;
 };
 

@@ -38,8 +38,8 @@ InvariantResponse<T> invariant_response(BulkLaw law, const InvariantStrain& s, c
   return with_invariant_law(law, [&](auto chosen) { return decltype(chosen)::response(s, m); });
 }
 
-inline VolumeEnergy volume_energy(BulkLaw law, double ratio) {
-  return with_invariant_law(law, [&](auto chosen) { return decltype(chosen)::volume_energy(ratio); });
+inline VolumeStrain volume_strain(BulkLaw law, double ratio) {
+  return with_invariant_law(law, [&](auto chosen) { return decltype(chosen)::volume_strain(ratio); });
 }
 
 }  // namespace supine::simulation

@@ -61,21 +61,18 @@ void add_log_volume_energy(const T& lambda, double log_j, InvariantResponse<T>& 
   w.wll += lambda;
 }
 
-/// Energy of the volume ratio Ĵ of a whole cell, per unit of its modulus, and its derivatives (terms/bulk.h). @pre Ĵ >
-/// 0
-struct VolumeEnergy {
-  double energy, first, second;
+/// Strain g(Ĵ) of the volume ratio Ĵ of a whole cell, g' and g''. Its energy is g²/2 per unit of modulus and volume
+/// (terms/bulk.h). @pre Ĵ > 0
+struct VolumeStrain {
+  double value, first, second;
 };
 
 /// What most laws have in common; a law says otherwise where it has to.
 struct InvariantLaw {
   /// How far the state is from a law's limit, 1 at rest; <= 0 where the law has no energy.
   static double margin(const InvariantStrain&, const BulkMaterial<double>&) { return 1; }
-  /// ln²Ĵ/2.
-  static VolumeEnergy volume_energy(double ratio) {
-    const double log_ratio = std::log(ratio);
-    return {0.5 * log_ratio * log_ratio, log_ratio / ratio, (1 - log_ratio) / (ratio * ratio)};
-  }
+  /// ln Ĵ.
+  static VolumeStrain volume_strain(double ratio) { return {std::log(ratio), 1 / ratio, -1 / (ratio * ratio)}; }
 };
 
 /// P = ∂W/∂F = 2 W1 F + W_L F^{-T} + 2 W2 (I1 F - F C).

@@ -8,7 +8,7 @@ namespace supine::simulation {
 /// μ/2 (J^{-2/3} I1 - 3) + κ/2 (J - 1)², κ = λ + 2μ/3 (CalculiX *HYPERELASTIC, NEO HOOKE with C10 = μ/2, D1 = 2/κ).
 struct NeoHookeanCalculix : InvariantLaw {
   /// (Ĵ - 1)²/2.
-  static VolumeEnergy volume_energy(double ratio) { return {0.5 * (ratio - 1) * (ratio - 1), ratio - 1, 1}; }
+  static VolumeStrain volume_strain(double ratio) { return {ratio - 1, 1, 0}; }
 
   /// @pre margin() > 0
   template <class T>

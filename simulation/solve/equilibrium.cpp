@@ -160,9 +160,11 @@ std::string EquilibriumSolver::failure(const Attempt& last, double load, const P
       what_, 100 * load, reason(last.end, last.iterations, last.residual_share), place);
 }
 
-State EquilibriumSolver::state_of(const Problem& problem, const Points& sought) {
-  return problem.unknown == Unknown::deformed ? State{.x = sought, .X = problem.known, .load = problem.load}
-                                              : State{.x = problem.known, .X = sought, .load = problem.load};
+State EquilibriumSolver::state_of(const Problem& problem, const Points& sought) const {
+  const Eigen::VectorXd* strain = volume_strain_.size() > 0 ? &volume_strain_ : nullptr;
+  const bool forward = problem.unknown == Unknown::deformed;
+  const Points &x = forward ? sought : problem.known, &X = forward ? problem.known : sought;
+  return {.x = x, .X = X, .load = problem.load, .volume_strain = strain};
 }
 
 /// Fills the sums with what a step and the merit need.
@@ -179,6 +181,7 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(const Problem& problem, Poi
     attempt.end = end;
     return attempt;
   };
+  start_volume(problem, sought);
   evaluate(problem, sought);
   for (;;) {
     measure(attempt);
@@ -186,7 +189,7 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(const Problem& problem, Poi
     if (options_.progress) options_.progress(what_, problem.load, attempt.iterations, attempt.residual_share);
     if (const auto end = settled(attempt)) return ended(*end);
     if (!find_step(problem, sought, attempt, step)) return ended(Termination::singular_tangent);
-    if (!search_line(problem, step, sought)) return ended(Termination::line_search_failed);
+    if (!search_line(problem, attempt, step, sought)) return ended(Termination::line_search_failed);
   }
 }
 
@@ -235,13 +238,15 @@ bool EquilibriumSolver::find_step(const Problem& problem, const Points& sought, 
                          : direction_.undeformed(state, tolerance, sums_, step);
   if (!found) return false;
   const double longest = step.cwiseAbs().maxCoeff();
-  if (longest > longest_step_mm) step *= longest_step_mm / longest;
+  attempt.step_share = std::min(1.0, longest_step_mm / longest);
+  if (attempt.step_share < 1) step *= attempt.step_share;
   attempt.moved_mm = step.cwiseAbs().maxCoeff();
   return true;
 }
 
 /// Moves @p sought along the step as far as lowers the merit. @return false, and @p sought as it was, where none does
-bool EquilibriumSolver::search_line(const Problem& problem, const Eigen::VectorXd& step, Points& sought) {
+bool EquilibriumSolver::search_line(const Problem& problem, const Attempt& attempt, const Eigen::VectorXd& step,
+                                    Points& sought) {
   const bool by_energy = problem.unknown == Unknown::deformed && mechanics_.has_energy();
   Line line{.start = sought,
             .step = step,
@@ -251,26 +256,59 @@ bool EquilibriumSolver::search_line(const Problem& problem, const Eigen::VectorX
             .residual_norm = sums_.residual.norm(),
             .residual = by_energy ? Eigen::VectorXd() : sums_.residual,
             .natural_mm = std::nullopt,
+            .volume_strain = volume_strain_,
+            .strain_step = {},
+            .mixed_norm = 0,
             .least_det_f = largest_fall * std::min(sums_.min_det_f, 1.0)};
+  if (by_energy && volume_strain_.size() > 0) {
+    follow_volume(problem, attempt.step_share, line);
+    line.mixed_norm = mixed_norm(state_of(problem, sought), sums_.residual);
+  }
   const bool last_digits = step.cwiseAbs().maxCoeff() < options_.step_tolerance_mm;
   double alpha = 1;
   for (int halving = 0; halving <= max_halvings; ++halving, alpha *= 0.5) {
     move_along(problem, line, alpha, sought);
     if (!keeps_volume(line)) continue;
     if (last_digits) return true;  // the step moves by rounding only: no merit says anything
-    if (!lowers_merit(line, alpha)) continue;
+    if (!lowers_merit(problem, sought, line, alpha)) continue;
     if (by_energy && halving == 0 && !direction_.exact()) go_further(problem, line, sought);
     return true;
   }
   sought = line.start;
+  volume_strain_ = line.volume_strain;
   return false;
 }
 
+/// Takes q from the shape, where the problem is one that follows it.
+void EquilibriumSolver::start_volume(const Problem& problem, const Points& sought) {
+  volume_strain_.resize(0);
+  if (problem.unknown != Unknown::deformed || !mechanics_.has_energy() || !mechanics_.volume().nearly_incompressible())
+    return;
+  Eigen::VectorXd none;
+  mechanics_.volume().volume_strain(state_of(problem, sought), none, volume_strain_, none);
+}
+
+/// How the step, @p share of a Newton step, moves q: as the linear system says.
+void EquilibriumSolver::follow_volume(const Problem& problem, double share, Line& line) const {
+  Eigen::VectorXd strain;
+  mechanics_.volume().volume_strain(state_of(problem, line.start), line.step, strain, line.strain_step);
+  line.strain_step += share * (strain - line.volume_strain);
+}
+
+/// |r| of the mixed form, of which q is an unknown too.
+double EquilibriumSolver::mixed_norm(const State& state, const Eigen::VectorXd& residual) {
+  mixed_residual_ = residual;
+  mechanics_.volume().take_off_pressure_defect(state, mixed_residual_);
+  return mixed_residual_.norm();
+}
+
 /// Whether the shape of the sums, @p alpha steps along the line, is better than where that starts.
-bool EquilibriumSolver::lowers_merit(Line& line, double alpha) {
+bool EquilibriumSolver::lowers_merit(const Problem& problem, const Points& sought, Line& line, double alpha) {
   if (line.by_energy) {
     const double rounding = energy_rounding * (std::abs(line.energy) + std::abs(sums_.energy));
-    return sums_.energy <= line.energy + sufficient_decrease * alpha * line.slope + rounding;
+    if (sums_.energy <= line.energy + sufficient_decrease * alpha * line.slope + rounding) return true;
+    if (line.volume_strain.size() == 0) return false;
+    return mixed_norm(state_of(problem, sought), sums_.residual) <= (1 - sufficient_decrease * alpha) * line.mixed_norm;
   }
   if (sums_.residual.norm() <= (1 - sufficient_decrease * alpha) * line.residual_norm) return true;
   if (!line.natural_mm) line.natural_mm = direction_.natural_mm(line.residual);
@@ -304,6 +342,7 @@ void EquilibriumSolver::go_further(const Problem& problem, const Line& line, Poi
 /// Puts @p sought @p alpha steps along the line, and the sums with it.
 void EquilibriumSolver::move_along(const Problem& problem, const Line& line, double alpha, Points& sought) {
   Flat(sought.data(), sought.size()) = ConstFlat(line.start.data(), line.start.size()) + alpha * line.step;
+  if (line.strain_step.size() > 0) volume_strain_ = line.volume_strain + alpha * line.strain_step;
   evaluate(problem, sought);
 }
 

@@ -117,6 +117,7 @@ class EquilibriumSolver {
     double share_before = 1;               ///< residual_share one iteration before
     double share_at_window = unknown_yet;  ///< residual_share when the present stall_window began
     double moved_mm = unknown_yet;         ///< largest part of the last step along an axis
+    double step_share = 1;                 ///< of the last Newton step, what longest_step_mm left of it
   };
   /// The line that a Newton step draws, and what is known where it starts.
   struct Line {
@@ -127,6 +128,9 @@ class EquilibriumSolver {
     double residual_norm;
     Eigen::VectorXd residual;          ///< only if not by energy
     std::optional<double> natural_mm;  ///< of that residual, once asked for
+    Eigen::VectorXd volume_strain;     ///< q where it starts; empty where it is not followed
+    Eigen::VectorXd strain_step;       ///< how the step moves q
+    double mixed_norm = 0;             ///< of the mixed form's residual where it starts
     double least_det_f;                ///< that a shape on the line must keep
   };
 
@@ -141,13 +145,16 @@ class EquilibriumSolver {
   std::optional<Termination> settled(Attempt& attempt) const;
   bool find_step(const Problem& problem, const Points& sought, Attempt& attempt, Eigen::VectorXd& step);
 
-  bool search_line(const Problem& problem, const Eigen::VectorXd& step, Points& sought);
-  bool lowers_merit(Line& line, double alpha);
+  bool search_line(const Problem& problem, const Attempt& attempt, const Eigen::VectorXd& step, Points& sought);
+  bool lowers_merit(const Problem& problem, const Points& sought, Line& line, double alpha);
   bool keeps_volume(const Line& line) const;
   void go_further(const Problem& problem, const Line& line, Points& sought);
   void move_along(const Problem& problem, const Line& line, double alpha, Points& sought);
 
-  static State state_of(const Problem& problem, const Points& sought);
+  void start_volume(const Problem& problem, const Points& sought);
+  void follow_volume(const Problem& problem, double share, Line& line) const;
+  double mixed_norm(const State& state, const Eigen::VectorXd& residual);
+  State state_of(const Problem& problem, const Points& sought) const;
   void evaluate(const Problem& problem, const Points& sought);
 
   const Mechanics& mechanics_;
@@ -155,7 +162,9 @@ class EquilibriumSolver {
   Sums sums_;
   NewtonDirection direction_;
   double weight_norm_ = 0;
-  std::string what_;  // the solve under way, for progress and messages
+  Eigen::VectorXd volume_strain_;   // q of VolumeStrainTerm at the shape of the sums; empty where it is not followed
+  Eigen::VectorXd mixed_residual_;  // work space
+  std::string what_;                // the solve under way, for progress and messages
 };
 
 }  // namespace supine::simulation

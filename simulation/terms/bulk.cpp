@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "common/error.h"
 #include "simulation/elements/tet_geometry.h"
 #include "simulation/laws/invariant_kernel.h"
@@ -64,6 +66,11 @@ struct CellStrain {
   }
 
   /// @param slope  ∂θ/∂F B_a
+  void add_slope(BulkLaw law, const Point& point) {
+    add_slope(point, is_invariant_law(law)
+                         ? Nodal<n>(point.det_f * (point.rest.b * InvariantStrain(point.f, point.det_f).g.transpose()))
+                         : Nodal<n>(point.rest.b * PolarPoint(point.f).r.transpose()));
+  }
   void add_slope(const Point& point, const Nodal<n>& slope) {
     by_x += point.rest.volume * slope;
     by_X += point.rest.volume * ((point.theta - mean) * point.rest.b - slope * point.f);
@@ -76,9 +83,9 @@ struct CellStrain {
   }
 };
 
-VolumeEnergy mean_energy(BulkLaw law, double mean) {
-  if (law == BulkLaw::corotational) return {0.5 * mean * mean, mean, 1};
-  return volume_energy(law, mean);
+VolumeStrain mean_strain(BulkLaw law, double mean) {
+  if (law == BulkLaw::corotational) return {mean, 1, 0};
+  return volume_strain(law, mean);
 }
 
 }  // namespace
@@ -151,13 +158,14 @@ void BulkTerm<Element>::add_cell(int e, const State& state, const Demand& demand
   const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
   const BulkLaw law = settings_.law;
   const auto& [material, excess] = material_[e];
-  const bool averaged = excess > 0, matrices = demand.tangent || demand.reference_tangent;
+  const bool averaged = excess > 0, slopes = averaged && (demand.tangent || demand.reference_tangent);
   CellStrain<Element> strain(law, x, rest, averaged);
   local.min_det_f = std::min(local.min_det_f, strain.least_det_f);
   if (!(local.min_det_f > 0)) return;
-  const VolumeEnergy mean = averaged ? mean_energy(law, strain.mean) : VolumeEnergy{0, 0, 0};
-  const double pressure = excess * mean.first;
-  if (demand.energy) local.energy += excess * strain.volume * mean.energy;
+  const VolumeStrain mean = averaged ? mean_strain(law, strain.mean) : VolumeStrain{0, 0, 0};
+  const double strain_of_pressure = slopes && state.volume_strain ? (*state.volume_strain)[e] : mean.value;
+  const double pressure = excess * strain_of_pressure * mean.first;
+  if (demand.energy) local.energy += 0.5 * excess * strain.volume * mean.value * mean.value;
 
   ElementSums<n> sums;
   sums.clear(demand);
@@ -173,17 +181,20 @@ void BulkTerm<Element>::add_cell(int e, const State& state, const Demand& demand
       response.wl += pressure * det_f;
       response.wll += pressure * det_f;
       add_invariant_point<n>(s, response, place.b, place.volume, demand, sums);
-      if (averaged && matrices) strain.add_slope(point, det_f * (place.b * s.g.transpose()));
+      if (slopes) strain.add_slope(point, det_f * (place.b * s.g.transpose()));
     } else if (law == BulkLaw::corotational) {
       const PolarPoint polar(f);
       if (demand.energy) local.energy += place.volume * polar.energy(material);
       add_polar_point<n>(polar, material, pressure, place.b, place.volume, demand, sums);
-      if (averaged && matrices) strain.add_slope(point, place.b * polar.r.transpose());
+      if (slopes) strain.add_slope(point, place.b * polar.r.transpose());
     } else {
       add_qr_point<n>(f, rest_edges<n>(rest), material, place.b, place.volume, edge_ends<n>(), demand, sums);
     }
   }
-  if (averaged) strain.add_mean(excess * mean.second, demand, sums);
+  if (slopes) {
+    strain.add_mean(excess * (mean.first * mean.first + strain_of_pressure * mean.second), demand, sums);
+    sums.force += (excess * (mean.value - strain_of_pressure) * mean.first) * strain.by_x;
+  }
   sums.write(demand, law != BulkLaw::corotational_qr, local);
 }
 
@@ -202,7 +213,8 @@ void BulkTerm<Element>::add_cell_derivative(int e, const State& state, const Cel
   const bool averaged = material.excess.a > 0;
   const CellStrain<Element> strain(law, x, rest, averaged);
   if (!(strain.least_det_f > 0)) return;
-  const Dual pressure = averaged ? material.excess * mean_energy(law, strain.mean).first : Dual(0.0);
+  const VolumeStrain mean = averaged ? mean_strain(law, strain.mean) : VolumeStrain{0, 0, 0};
+  const Dual pressure = material.excess * (mean.value * mean.first);
   for (const auto& point : strain.points) {
     const auto stress = bulk_stress<Dual>(law, point.f, material.point, rest_edges<n>(rest), pressure);
     Matrix3 derivative;
@@ -220,6 +232,54 @@ void BulkTerm<Element>::add_parameter_derivative(const State& state, const Field
       return;
     add_cell_derivative(e, state, cell_material(fields, e), local);
   });
+}
+
+template <class Element>
+bool BulkTerm<Element>::nearly_incompressible() const {
+  constexpr double many_shear_moduli = 20;
+  return std::any_of(material_.begin(), material_.end(),
+                     [](const auto& m) { return m.excess > many_shear_moduli * m.point.mu_kpa; });
+}
+
+template <class Element>
+void BulkTerm<Element>::volume_strain(const State& state, const Eigen::VectorXd& step, Eigen::VectorXd& strain,
+                                      Eigen::VectorXd& change) const {
+  constexpr int n = Element::nodes;
+  const bool moves = step.size() > 0;
+  strain.setZero(elements_.count());
+  if (moves) change.setZero(elements_.count());
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index e = 0; e < elements_.count(); ++e) {
+    if (!(material_[e].excess > 0)) continue;
+    CellStrain<Element> cell(settings_.law, gather<n>(state.x, elements_.nodes(), static_cast<int>(e)),
+                             gather<n>(state.X, elements_.nodes(), static_cast<int>(e)), true);
+    if (!(cell.least_det_f > 0)) continue;
+    const VolumeStrain mean = mean_strain(settings_.law, cell.mean);
+    strain[e] = mean.value;
+    if (!moves) continue;
+    for (const auto& point : cell.points) cell.add_slope(settings_.law, point);
+    double dilation = 0;
+    for (int a = 0; a < n; ++a) dilation += cell.by_x.row(a).dot(step.segment<3>(3 * elements_.nodes()(e, a)));
+    change[e] = mean.first * dilation / cell.volume;
+  }
+}
+
+template <class Element>
+void BulkTerm<Element>::take_off_pressure_defect(const State& state, Eigen::VectorXd& residual) const {
+  constexpr int n = Element::nodes;
+  if (state.volume_strain == nullptr) return;
+  for (int e = 0; e < elements_.count(); ++e) {
+    const double excess = material_[e].excess;
+    if (!(excess > 0)) continue;
+    CellStrain<Element> cell(settings_.law, gather<n>(state.x, elements_.nodes(), e),
+                             gather<n>(state.X, elements_.nodes(), e), true);
+    if (!(cell.least_det_f > 0)) continue;
+    for (const auto& point : cell.points) cell.add_slope(settings_.law, point);
+    const VolumeStrain mean = mean_strain(settings_.law, cell.mean);
+    const double defect = excess * (mean.value - (*state.volume_strain)[e]) * mean.first;
+    for (int a = 0; a < n; ++a)
+      residual.segment<3>(3 * elements_.nodes()(e, a)) -= defect * cell.by_x.row(a).transpose();
+  }
 }
 
 template class BulkTerm<Tet4>;

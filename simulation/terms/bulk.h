@@ -6,7 +6,7 @@
 
 #include "simulation/elements/elements.h"
 #include "simulation/laws/bulk_laws.h"
-#include "simulation/terms/term.h"
+#include "simulation/terms/volume_strain.h"
 
 namespace supine::simulation {
 
@@ -37,7 +37,7 @@ std::string locking_warning(int order, const Eigen::VectorXd& poisson, Volumetri
 /// docs/mechanics.md.
 /// @tparam Element  Tet4 or Tet10
 template <class Element>
-class BulkTerm : public Term {
+class BulkTerm : public Term, public VolumeStrainTerm {
  public:
   /// @throws InputError  corotational_qr on quadratic cells: the study defines it for linear ones
   BulkTerm(const Indices& cells, const Pattern& pattern, const BulkSettings& settings);
@@ -48,6 +48,11 @@ class BulkTerm : public Term {
   void add(const State& state, const Demand& demand, Sums& sums) const override;
   void add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const override;
   bool has_energy() const override { return settings_.law != BulkLaw::corotational_qr; }
+
+  bool nearly_incompressible() const override;
+  void volume_strain(const State& state, const Eigen::VectorXd& step, Eigen::VectorXd& strain,
+                     Eigen::VectorXd& change) const override;
+  void take_off_pressure_defect(const State& state, Eigen::VectorXd& residual) const override;
 
  private:
   template <class T>

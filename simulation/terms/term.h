@@ -11,6 +11,8 @@ struct State {
   const Points& x;  ///< deformed nodes, #N by 3, mm
   const Points& X;  ///< undeformed nodes, #N by 3, mm
   double load = 1;  ///< factor on gravity, tractions and the muscle's motion, 0 to 1
+  /// #cells: volume strain q that the pressure inside ∂r/∂x has (terms/volume_strain.h); nullptr: that of x and X.
+  const Eigen::VectorXd* volume_strain = nullptr;
 };
 
 /// A piece of mechanics. Its contribution to the residual r is the derivative with respect to x of its energy
