@@ -13,6 +13,8 @@
 namespace supine::simulation {
 namespace {
 
+constexpr double many_shear_moduli = 20;  // of κ: nearly incompressible
+
 template <int N>
 Edges rest_edges(const NodeRows<N>& nodes) {
   Edges edges;
@@ -236,7 +238,6 @@ void BulkTerm<Element>::add_parameter_derivative(const State& state, const Field
 
 template <class Element>
 bool BulkTerm<Element>::nearly_incompressible() const {
-  constexpr double many_shear_moduli = 20;
   return std::any_of(material_.begin(), material_.end(),
                      [](const auto& m) { return m.excess > many_shear_moduli * m.point.mu_kpa; });
 }
