@@ -20,9 +20,7 @@ testing::TestScene block(int n, int order) {
   return scene;
 }
 
-/// How far the top of a block of 3 kPa on a clamped base moves along gravity that pulls sideways and down, mm.
-double movement(int n, int order, Volumetric volumetric, double poisson, BulkLaw law = BulkLaw::neo_hookean) {
-  const testing::TestScene scene = block(n, order);
+Model block_model(Volumetric volumetric, double poisson, BulkLaw law) {
   Model model = testing::soft_model(law);
   model.breast.young_modulus_kpa.value = 3;
   model.breast.poisson_ratio.value = poisson;
@@ -30,21 +28,83 @@ double movement(int n, int order, Volumetric volumetric, double poisson, BulkLaw
   model.skin.young_modulus_kpa.value = 0;
   model.interface.kind = InterfaceKind::fixed;
   model.cut.stiffness_kpa_per_mm.value = 0;
-  Mechanics mechanics(scene.mesh, scene.anatomy, model);
-  const Eigen::Vector3d pull(0.8, 0, -0.6);
-  mechanics.set_fields(
-      values_of(make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics.layout(), "prone"}, pull)));
-  EquilibriumSolver solver(mechanics);
+  return model;
+}
+
+/// A block of 3 kPa on a clamped base under gravity that pulls sideways and down.
+struct PulledBlock {
+  testing::TestScene scene;
+  Model model;
+  Mechanics mechanics;
+  const Eigen::Vector3d pull{0.8, 0, -0.6};
+
+  PulledBlock(int n, int order, Volumetric volumetric, double poisson, BulkLaw law = BulkLaw::neo_hookean)
+      : scene(block(n, order)),
+        model(block_model(volumetric, poisson, law)),
+        mechanics(scene.mesh, scene.anatomy, model) {
+    mechanics.set_fields(
+        values_of(make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics.layout(), "prone"}, pull)));
+  }
+  SolveReport solve(Points& x) const { return EquilibriumSolver(mechanics).forward(scene.mesh.points, x, "block"); }
+};
+
+/// How far its top moves along gravity, mm.
+double movement(int n, int order, Volumetric volumetric, double poisson, BulkLaw law = BulkLaw::neo_hookean) {
+  const PulledBlock pulled(n, order, volumetric, poisson, law);
+  const Points& rest = pulled.scene.mesh.points;
   Points x;
-  solver.forward(scene.mesh.points, x, "block");
+  pulled.solve(x);
   double sum = 0;
   int count = 0;
   for (Eigen::Index p = 0; p < x.rows(); ++p)
-    if (scene.mesh.points(p, 2) > 39.999) {
-      sum += (x.row(p) - scene.mesh.points.row(p)).dot(pull);
+    if (rest(p, 2) > 39.999) {
+      sum += (x.row(p) - rest.row(p)).dot(pulled.pull);
       ++count;
     }
   return sum / count;
+}
+
+// Figures of docs/mechanics.md: 16 steps where the pressure inside the tangent is that of the shape.
+TEST(Locking, NewtonsStepsDoNotGrowTowardIncompressibility) {
+  Points x;
+  const int moderate = PulledBlock(4, 2, Volumetric::mean, 0.45).solve(x).newton_iterations;
+  EXPECT_LE(PulledBlock(4, 2, Volumetric::mean, 0.4995).solve(x).newton_iterations, 2 * moderate) << moderate;
+}
+
+/// The entries of nodes above the clamped base; 0 on it.
+Eigen::VectorXd free_part(const Points& X, Eigen::VectorXd entries) {
+  for (Eigen::Index n = 0; n < X.rows(); ++n)
+    if (X(n, 2) < 1e-9) entries.segment<3>(3 * n).setZero();
+  return entries;
+}
+
+// With q in the place of the shape's own volume strain: ∂r/∂x s is how the mixed form's residual moves with x and q.
+TEST(Locking, TangentAtAPressureOfItsOwnIsThatOfTheMixedForm) {
+  for (const BulkLaw law : {BulkLaw::neo_hookean, BulkLaw::neo_hookean_calculix, BulkLaw::corotational}) {
+    const PulledBlock pulled(2, 2, Volumetric::mean, 0.499, law);
+    const Points& X = pulled.scene.mesh.points;
+    const int nodes = static_cast<int>(X.rows()), cells = static_cast<int>(pulled.scene.mesh.cells.rows());
+    const Points x = X + 0.2 * testing::random_matrix(nodes, 3, 1);
+    const Eigen::VectorXd q = 0.02 * testing::random_matrix(cells, 1, 2),
+                          step = free_part(X, testing::random_matrix(3 * nodes, 1, 3));
+    Sums sums(pulled.mechanics.pattern());
+    Eigen::VectorXd strain, change;
+    const VolumeStrainTerm& volume = pulled.mechanics.volume();
+    volume.volume_strain({x, X}, step, strain, change);
+    const auto mixed = [&](double h) -> Eigen::VectorXd {
+      Points there = x;
+      Eigen::Map<Eigen::VectorXd>(there.data(), there.size()) += h * step;
+      const Eigen::VectorXd strain_there = q + h * change;
+      const State state{.x = there, .X = X, .volume_strain = &strain_there};
+      pulled.mechanics.evaluate(state, Demand{.residual = true}, sums);
+      Eigen::VectorXd residual = sums.residual;
+      volume.take_off_pressure_defect(state, residual);
+      return residual;
+    };
+    pulled.mechanics.evaluate({.x = x, .X = X, .volume_strain = &q}, Demand{.residual = true, .tangent = true}, sums);
+    const Eigen::VectorXd slope = sums.tangent * step;
+    EXPECT_GT(testing::taylor_order([&](double h) { return free_part(X, mixed(h)); }, slope), 1.9) << name_of(law);
+  }
 }
 
 // A coarse mesh may be stiff, but not stiffer for ν = 0.499 than for 0.4.
