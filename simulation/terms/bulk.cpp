@@ -67,12 +67,12 @@ struct CellStrain {
     if (averaged) mean /= volume;
   }
 
-  /// @param slope  ∂θ/∂F B_a
   void add_slope(BulkLaw law, const Point& point) {
     add_slope(point, is_invariant_law(law)
                          ? Nodal<n>(point.det_f * (point.rest.b * InvariantStrain(point.f, point.det_f).g.transpose()))
                          : Nodal<n>(point.rest.b * PolarPoint(point.f).r.transpose()));
   }
+  /// @param slope  ∂θ/∂F B_a
   void add_slope(const Point& point, const Nodal<n>& slope) {
     by_x += point.rest.volume * slope;
     by_X += point.rest.volume * ((point.theta - mean) * point.rest.b - slope * point.f);
