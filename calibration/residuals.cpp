@@ -53,6 +53,22 @@ Eigen::VectorXd slope_at(Evaluator& evaluator, const simulation::Model& model, c
   return slope;
 }
 
+Eigen::VectorXd distance_change(const Prediction& prediction, const Residuals& residuals,
+                                const std::vector<Points>& moves) {
+  std::vector<Points> unit;
+  for (const PosePrediction& pose : prediction.poses) unit.push_back(direction(pose.scan_points, pose.distances));
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(residuals.size());
+  for (Eigen::Index r = 0; r < residuals.size(); ++r) {
+    const auto m = static_cast<std::size_t>(residuals.pose[r]);
+    if (moves[m].rows() == 0) continue;
+    const ClosestPoints& closest = prediction.poses[m].distances.closest;
+    const int i = residuals.point[r];
+    for (int k = 0; k < 3; ++k)
+      change[r] -= closest.weight(i, k) * moves[m].row(closest.node(i, k)).dot(unit[m].row(i));
+  }
+  return change;
+}
+
 Linearisation linearise(Evaluator& evaluator, const simulation::Sensitivities& sensitivities,
                         const FreeParameters& parameters, const Eigen::VectorXd& u, const Prediction& prediction,
                         const Residuals& residuals) {

@@ -46,4 +46,9 @@ Eigen::VectorXd slope_at(Evaluator& evaluator, const simulation::Model& model, c
                          const Residuals& residuals, const std::string& parameter,
                          const simulation::ChainDerivative& derivative);
 
+/// Change of the residuals' distances when the nodes of each pose move, by the envelope theorem (signed_distance.h).
+/// @param moves  per pose, #N by 3, mm; empty where nothing moves
+Eigen::VectorXd distance_change(const Prediction& prediction, const Residuals& residuals,
+                                const std::vector<Points>& moves);
+
 }  // namespace supine::calibration

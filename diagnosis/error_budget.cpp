@@ -1,55 +1,48 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/error_budget.h"
 
-#include <Eigen/Dense>
-#include <algorithm>
 #include <cmath>
 
 #include "common/rms.h"
-#include "common/statistics.h"
+#include "diagnosis/examine.h"
 
 namespace supine::diagnosis {
 namespace {
 
-/// What the fit under all errors leaves of a field.
-class LeftByFit {
- public:
-  LeftByFit(const Eigen::MatrixXd& slope, const Whitening& whitening)
-      : slope_(slope), white_(whitening.apply(slope)), whitening_(whitening) {
-    covariance_ = covariance_of(white_.transpose() * white_);
-  }
+/// Of some of the numbers of a hypothesis: root of the mean variance they leave over the clusters.
+template <class Wanted>
+double doubt_of(const Hypothesis& h, Wanted wanted) {
+  const Directions& all = h.evidence->directions();
+  std::vector<int> places, rows;
+  for (std::size_t k = 0; k < h.rows.size(); ++k)
+    if (wanted(all.names[static_cast<std::size_t>(h.rows[k])]))
+      places.push_back(static_cast<int>(k)), rows.push_back(h.rows[k]);
+  if (rows.empty()) return 0;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(rows.size()), rows.size());
+  for (std::size_t b = 0; b < h.weighed.covariance.size(); ++b)
+    covariance += h.weighed.size_probability[static_cast<Eigen::Index>(b)] * h.weighed.covariance[b](places, places);
+  const Eigen::MatrixXd columns = all.columns(Eigen::all, rows);
+  return std::sqrt((columns * covariance).cwiseProduct(columns).sum() / static_cast<double>(columns.rows()));
+}
 
-  double mean_square_of(const Eigen::VectorXd& field) const {
-    return mean_square(field - slope_ * (covariance_ * (white_.transpose() * whitening_.apply(field))));
-  }
-
-  const Eigen::MatrixXd& covariance() const { return covariance_; }
-
- private:
-  const Eigen::MatrixXd& slope_;
-  Eigen::MatrixXd white_, covariance_;
-  const Whitening& whitening_;
-};
+bool is_of_measurement(const std::string& name) {
+  return name.find('/') != std::string::npos && name.find("stiffness") == std::string::npos &&
+         name.find("interface.") == std::string::npos && name.find("adhesion") == std::string::npos;
+}
 
 }  // namespace
 
-ErrorBudget error_budget(const WeightedFit& fit, const ErrorSources& sources, const Metric& metric) {
-  const calibration::Fit& f = fit.solution;
-  const Eigen::MatrixXd& slope = f.linearisation.slope;
-  const LeftByFit left(slope, *metric.whitening);
-  const double total = mean_square(f.residuals.distance_mm);
-  double noise = mean_square(sources.noise_mm), registration = 0;
-  double numerical = std::pow(sources.spread_mm, 2) + mean_square(sources.mean_mm);
-  for (const ErrorMode& mode : sources.modes)
-    (mode.source == "numerical" || mode.source == "mesh" ? numerical : registration) +=
-        left.mean_square_of(mode.shape_mm);
-  double parameters = (slope * left.covariance()).cwiseProduct(slope).sum() / static_cast<double>(slope.rows());
-  noise = std::min(noise, total);
-  const double known = registration + numerical + parameters, share = std::min(1.0, (total - noise) / known);
-  if (known > 0) registration *= share, numerical *= share, parameters *= share;
-  const double model = std::max(0.0, total - noise - registration - numerical - parameters);
-  return {std::sqrt(total),     std::sqrt(noise),      std::sqrt(registration),
-          std::sqrt(numerical), std::sqrt(parameters), std::sqrt(model)};
+ErrorBudget error_budget(const Findings& found) {
+  const Hypothesis& h = found.hypotheses.front();
+  ErrorBudget budget;
+  budget.total = found.rms_mm;
+  budget.noise = rms(found.base.noise_of_point_mm);
+  budget.registration = doubt_of(h, is_of_measurement);
+  budget.parameters = doubt_of(h, [](const std::string& name) { return !is_of_measurement(name); });
+  if (found.base.numerical) budget.numerical = found.base.numerical->spread_mm;
+  budget.patchiness = found.base.patchiness_mm;
+  budget.model_form = found.unexplained.mean_mm;
+  return budget;
 }
 
 }  // namespace supine::diagnosis

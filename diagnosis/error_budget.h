@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include "diagnosis/weighted_fit.h"
-
 namespace supine::diagnosis {
 
-/// What the RMS of the residual is made of, mm; the squares add up to its square.
-///
-/// The modes of each source count with what the fit of the free parameters leaves of them, tr(M Σ_source Mᵀ)/n; noise,
-/// the mesh's mean and its spread in full. Segmentation and chest wall are under registration. Where the known
-/// sources alone would make more than is there, registration, numerical error and parameters (which are tolerances, not
-/// measurements) are shortened alike until the sum fits, then noise; else the rest is the model's.
+struct Findings;
+
+/// What keeps the distances of the base model from zero, rms over the fitted points, mm: what the scan's noise makes,
+/// what is left to doubt after the fit in the scans' places and the other measurement errors, in mesh, moduli and
+/// springs, in uneven tissue, skin and muscle, and what no effect explains. They do not add up to the total: the fit
+/// takes most of each away.
 struct ErrorBudget {
-  double total = 0, noise = 0, registration = 0, numerical = 0, parameters = 0, model_form = 0;
+  double total = 0, noise = 0, registration = 0, numerical = 0, parameters = 0, patchiness = 0, model_form = 0;
 };
 
-ErrorBudget error_budget(const WeightedFit& fit, const ErrorSources& sources, const Metric& metric);
+ErrorBudget error_budget(const Findings& found);
 
 }  // namespace supine::diagnosis

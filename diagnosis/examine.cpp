@@ -1,202 +1,217 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/examine.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <random>
+#include <set>
 
-#include "calibration/held_out.h"
-#include "calibration/uncertainty.h"
 #include "common/error.h"
 #include "common/rms.h"
-#include "diagnosis/intervals.h"
-#include "diagnosis/secants.h"
+#include "common/statistics.h"
+#include "diagnosis/evidence/left_out.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
 namespace {
 
-using calibration::FreeParameters;
+using Eigen::Index;
+using Eigen::VectorXd;
 
-constexpr double far_from_given = 0.7;  // a factor of 2
-constexpr double least_worth = 3;
-constexpr double worth_share = 0.05;  // of the best score: what is further behind is not refitted
+constexpr double worth_refitting = 0.01;     // screened probability
+constexpr double held_by_refits = 0.99;      // of the screened probability
+constexpr double stands_out = 0.05;          // inclusion from which more than two sets are followed
+constexpr std::size_t refits_when_quiet = 2;
 
 void tell(const ExamineOptions& options, const std::string& what) {
   if (options.progress) options.progress(what);
 }
 
-void measure_mesh(const Subject& subject, const simulation::Model& model, const calibration::Fit& fit,
-                  const ExamineOptions& options, Findings& found) {
-  const std::optional<NumericalError> before = std::move(found.numerical);
-  found.numerical.reset();
-  found.numerical_failure.clear();
-  if (!options.other_meshes) {
-    found.numerical_failure = "not asked for";
-    return;
-  }
-  tell(options, "two other meshes");
-  try {
-    found.numerical = measure_numerical_error(subject.fitted, model, fit, before ? &*before : nullptr);
-  } catch (const NumericalFailure& failure) {
-    found.numerical_failure = failure.what();
-  }
+/// Effects that appear in what is screened with at least some probability.
+bool something_stands_out(const Findings& found) {
+  for (std::size_t e = 0; e < found.candidates.size(); ++e)
+    if (inclusion(found.hypotheses, static_cast<int>(e)) > stands_out) return true;
+  return false;
 }
 
-/// What is known of the errors, at coordinates @p u, and the least of F under them from there.
-/// @param near  solution of @p u, or nullptr
-void fit_from(const Subject& subject, calibration::Evaluator& evaluator, const FreeParameters& parameters,
-              const Eigen::VectorXd& u, const simulation::ChainSolution* near, const ExamineOptions& options,
-              Findings& found) {
-  calibration::FitOptions as_given;
-  as_given.noise_mm = subject.noise_mm;
-  as_given.near = near;
-  tell(options, "sensitivities");
-  const calibration::Fit fit = calibration::evaluate_fit(evaluator, parameters, as_given, u);
-  const simulation::Model model = parameters.model(u);
-  const auto errors = calibration::fit_error_model(fit.residuals, fit.linearisation.slope);
-  measure_mesh(subject, model, fit, options, found);
-  found.unseen.clear();
-  const auto candidates = find_candidates(evaluator, model, fit, found.unseen);
-  found.sources = error_sources(fit.residuals, candidates, found.numerical ? &*found.numerical : nullptr, errors,
-                                options.tolerances);
-  found.whitening = Whitening::of(fit.residuals, found.sources);
-  found.metric = {&found.whitening, found.sources.mean_mm, fit.mask, subject.noise_mm};
-  tell(options, "fit under all errors");
-  found.base = weigh(evaluator, parameters, found.metric, u, &fit.prediction.solution);
-  descend(evaluator, parameters, found.metric, DescentOptions{}, found.base);
+/// The next hypothesis that should be followed through the chain, or nullptr.
+const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses) {
+  double sum = 0;
+  for (const Hypothesis& h : hypotheses) {
+    if (!h.effects.empty() && !h.refitted && h.probability >= worth_refitting) return &h;
+    sum += h.probability;
+    if (sum >= held_by_refits) break;
+  }
+  return nullptr;
 }
 
-/// How far a modulus is from the one given, in its logarithm.
-double farthest_modulus(const FreeParameters& parameters, const Eigen::VectorXd& u) {
-  double farthest = 0;
-  const auto is_shape = [&parameters](Eigen::Index i) {
-    return simulation::find_parameter(parameters.names()[static_cast<std::size_t>(i)])->shape;
+void follow(const Subject& subject, const ExamineOptions& options, Findings& found) {
+  auto most = static_cast<std::size_t>(options.refits);
+  if (!something_stands_out(found)) most = std::min(most, refits_when_quiet);
+  while (found.refits.size() < most) {
+    const Hypothesis* next = next_to_refit(found.hypotheses);
+    if (next == nullptr) break;
+    const std::vector<int> effects = next->effects;
+    std::vector<std::string> names;
+    for (const int e : effects) names.push_back(found.candidates[static_cast<std::size_t>(e)].effect);
+    tell(options, fmt::format("refit with {}", fmt::join(names, " and ")));
+    Refit refit = diagnosis::refit(subject.scene, subject.given, found.base, found.candidates, *next);
+    for (Hypothesis& h : found.hypotheses) {
+      if (h.effects != effects) continue;
+      if (refit.solved)
+        h = refit.hypothesis;
+      else
+        h.refitted = true;  // stays as screened
+    }
+    found.refits.push_back(std::move(refit));
+    normalise(found.hypotheses);
+  }
+  const auto rank = [&found](const Refit& refit) {
+    for (const Hypothesis& h : found.hypotheses)
+      if (refit.solved && h.effects == refit.hypothesis.effects) return h.probability;
+    return -1.0;
   };
-  for (Eigen::Index i = 0; i < u.size(); ++i)
-    if (parameters.is_log(i) && !is_shape(i)) farthest = std::max(farthest, std::abs(u[i] - parameters.start()[i]));
-  return farthest;
+  std::stable_sort(found.refits.begin(), found.refits.end(),
+                   [&rank](const Refit& a, const Refit& b) { return rank(a) > rank(b); });
 }
 
-/// Errors from the model as given; then the base model at the least of F, and the catalogue there.
-void fit_base(const Subject& subject, calibration::Evaluator& evaluator, const ExamineOptions& options,
-              Findings& found) {
-  const FreeParameters parameters(subject.model);
-  fit_from(subject, evaluator, parameters, parameters.start(), subject.near, options, found);
-  // Where something is missing a calibration may end at moduli no body has: errors measured there are not the body's.
-  if (farthest_modulus(parameters, found.base.solution.u) > far_from_given) {
-    const calibration::Fit first = std::move(found.base.solution);
-    fit_from(subject, evaluator, parameters, first.u, &first.prediction.solution, options, found);
+const Hypothesis& nothing_of(const Findings& found) {
+  return *std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
+                       [](const Hypothesis& h) { return h.effects.empty(); });
+}
+
+/// What was left out, predicted by the likeliest hypothesis with an effect beside the same without it.
+void ask_what_was_left_out(const Subject& subject, Findings& found) {
+  std::vector<LeftOut> parts;
+  for (Inclusion& one : found.included) {
+    if (one.probability < found.priors.named_at) break;
+    if (parts.empty()) parts = left_out_parts(subject.scene, found.base);
+    const auto names = found.effects();
+    const int effect = static_cast<int>(std::find(names.begin(), names.end(), one.effect) - names.begin());
+    const auto has = [](const Hypothesis& h, int e) {
+      return std::find(h.effects.begin(), h.effects.end(), e) != h.effects.end();
+    };
+    const auto with = std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
+                                   [&](const Hypothesis& h) { return has(h, effect); });
+    std::vector<int> others = with->effects;
+    std::erase(others, effect);
+    const auto without = std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
+                                      [&](const Hypothesis& h) { return h.effects == others; });
+    const Hypothesis& less = without == found.hypotheses.end() ? nothing_of(found) : *without;
+    for (const LeftOut& part : parts) one.left_out_gain += left_out_gain(found.base, *with, less, part);
   }
-  tell(options, "catalogue");
-  found.model = parameters.model(found.base.solution.u);
-  found.free = parameters.names();
-  found.unseen.clear();
-  found.candidates = find_candidates(evaluator, found.model, found.base.solution, found.unseen);
 }
 
-void judge_base(const Subject& subject, Findings& found) {
-  const FreeParameters parameters(subject.model);
-  const calibration::Fit& fit = found.base.solution;
-  BaseFigures& f = found.figures;
-  f.rms_mm = rms(fit.residuals.distance_mm);
-  f.held_out_rms_mm =
-      rms(calibration::held_out_distances(fit.residuals, fit.linearisation.slope, parameters.prior_information(),
-                                          calibration::spatial_blocks(fit.residuals)));
-  f.noise_mm = rms(found.sources.noise_mm);
-  f.left = lack_of_fit(found.base, found.metric);
+Unexplained summary(std::vector<double> draws) {
+  double sum = 0;
+  for (const double draw : draws) sum += draw;
+  return {sum / static_cast<double>(draws.size()), quantile(draws, 0.025), quantile(draws, 0.975)};
 }
 
-/// Whether chance gives what is seen: nothing is refitted then.
-bool is_quiet(const Findings& found, const VerdictRules& rules) {
-  return !found.table.scores.empty() && found.table.scores.front().p_value >= rules.p_value &&
-         found.figures.left.p_value >= rules.lack_of_fit_p;
-}
-
-/// @param corrected  by what finer elements change there
-void judge_by_other_poses(const Subject& subject, const ExamineOptions& options, bool corrected, Findings& found) {
-  const bool any = subject.whole.measurements.size() > subject.fitted.measurements.size();
-  if (any && corrected && found.numerical) {
-    tell(options, "finer mesh in poses that are not fitted");
-    for (const Eigen::VectorXd& change : measure_unfitted_error(subject.whole, *found.numerical))
-      found.sources.unfitted_mean_mm.push_back(options.tolerances.correction * change);
+/// RMS of draws of the discrepancy over the fitted points, in each of the likeliest hypotheses and over all.
+void find_unexplained(unsigned seed, Findings& found) {
+  constexpr int draws = 200;
+  std::mt19937_64 generator(seed);
+  const VectorXd& members = found.base.clusters.members;
+  const auto draw = [&](const Hypothesis& h) {
+    const VectorXd field = h.evidence->draw_discrepancy(h.rows, h.weighed, generator);
+    return std::sqrt(field.cwiseAbs2().dot(members) / members.sum());
+  };
+  std::vector<double> weights;
+  const auto of_one = [&](const Hypothesis& h) {
+    std::vector<double> drawn;
+    for (int k = 0; k < draws; ++k) drawn.push_back(draw(h));
+    return summary(std::move(drawn));
+  };
+  for (const Hypothesis& h : found.hypotheses) {
+    weights.push_back(h.probability);
+    if (found.unexplained_by.size() < Findings::hypotheses_told) found.unexplained_by.push_back(of_one(h));
   }
-  if (any) tell(options, "poses that are not fitted");
-  found.others = other_poses_of_base(subject.whole, FreeParameters(subject.model), found.base, found.sources,
-                                     found.metric, options.tolerances);
-  found.figures.pose_rms_mm = found.others.rms_mm(), found.figures.pose_noise_mm = found.others.noise_mm;
-  found.figures.unfitted_poses = found.others.unfitted;
+  found.left_by_base = of_one(nothing_of(found));
+  std::discrete_distribution<std::size_t> which(weights.begin(), weights.end());
+  std::vector<double> all;
+  for (int k = 0; k < 2 * draws; ++k) all.push_back(draw(found.hypotheses[which(generator)]));
+  found.unexplained = summary(all);
 }
 
-/// Sizes and intervals of what is named, with the mesh's error measured again where it is in the model.
-void settle_named(const Subject& subject, const ExamineOptions& options, Findings& found) {
-  constexpr std::size_t most = 3;
-  const auto& names = found.diagnosis.missing;
-  if (found.diagnosis.verdict == Verdict::nothing_missing) return;
-  for (std::size_t n = 0; n < std::min(most, names.size()); ++n)
-    for (Refit& refit : found.refits)
-      if (refit.effect == names[n] && refit.finished) {
-        tell(options, "interval of " + refit.effect);
-        settle(subject.fitted, found.sources, found.numerical ? &*found.numerical : nullptr, options.tolerances,
-               found.metric, refit);
+/// Where a scan lies by the likeliest hypothesis: its own nuisances and what an effect adds to them.
+std::vector<ScanPlace> find_places(const Subject& subject, const Findings& found) {
+  const Hypothesis& h = found.hypotheses.front();
+  const Directions& all = h.evidence->directions();
+  const simulation::Effect& place = simulation::place_of_scan();
+  std::vector<ScanPlace> places;
+  for (const auto* measurement : subject.scene.measurements) {
+    ScanPlace at{measurement->pose.name, {}, {}, {}};
+    for (int i = 0; i < 6; ++i) {
+      const auto& row = place.parameters()[static_cast<std::size_t>(i)];
+      const std::string of_model = simulation::parameter_name(place, row);
+      VectorXd weights = VectorXd::Zero(static_cast<Index>(h.rows.size()));
+      double stands = 0;
+      for (const std::string& name : {at.pose + "/" + of_model, of_model}) {
+        const int k = h.place_of(name);
+        if (k < 0) continue;
+        const int direction = h.rows[static_cast<std::size_t>(k)];
+        weights[k] = all.unit[direction];
+        stands += all.stands[direction];
       }
+      const auto [offset, sd] = h.weighed.sum(weights);
+      const double unit = i < 3 ? 1 : 180 / std::numbers::pi;
+      (i < 3 ? at.shift_mm : at.turn_deg)[i % 3] = unit * (stands + offset);
+      at.sd[i] = unit * sd;
+    }
+    places.push_back(at);
+  }
+  return places;
 }
-
-double beyond_freedom(const Score& score, double statistic) { return statistic - 2 * score.freedom; }
 
 }  // namespace
 
-std::vector<std::string> worth_refitting(const ScoreTable& table, const Tolerances& tolerances, std::size_t poses,
-                                         std::size_t count) {
-  double best = 0;
-  for (const Score& score : table.scores) best = std::max(best, beyond_freedom(score, score.statistic));
-  std::vector<std::pair<double, std::string>> ranked;
-  for (const Score& score : table.scores)
-    if (beyond_freedom(score, score.statistic) > std::max(least_worth, worth_share * best))
-      ranked.emplace_back(
-          beyond_freedom(score, statistic_without(score, shared_tolerance_for(score.effect, {}, tolerances, poses))),
-          score.effect);
-  std::stable_sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  std::vector<std::string> effects;
-  for (std::size_t i = 0; i < std::min(count, ranked.size()); ++i) effects.push_back(ranked[i].second);
-  return effects;
+std::vector<std::string> Findings::effects() const {
+  std::vector<std::string> names;
+  for (const Candidate& candidate : candidates) names.push_back(candidate.effect);
+  return names;
 }
 
-RefitProblem refit_problem(const Subject& subject, const Findings& found,
-                           const std::function<void(const std::string&)>& progress) {
-  return {subject.fitted, subject.whole, &subject.model,
-          &found.model,   &found.base,   &found.metric,
-          &found.sources, &found.others, std::log(found.whitening.effective_points()),
-          progress};
+const Refit* Findings::refit_of(const std::vector<std::string>& wanted) const {
+  const std::set<std::string> set(wanted.begin(), wanted.end());
+  for (const Refit& refit : refits)
+    if (refit.solved && std::set<std::string>(refit.effects.begin(), refit.effects.end()) == set) return &refit;
+  return nullptr;
 }
 
 std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& options) {
   auto found = std::make_unique<Findings>();
-  found->tolerances = options.tolerances;
-  calibration::Evaluator evaluator(subject.fitted, subject.model, accurate_enough());
-  fit_base(subject, evaluator, options, *found);
-  const RefitProblem problem = refit_problem(subject, *found, options.progress);
+  found->priors = options.priors;
+  calibration::Evaluator evaluator(subject.scene, subject.start, accurate_enough());
+  found->base = fit_base_model(evaluator, subject.given, subject.start, subject.noise_mm, subject.near,
+                               {options.priors, options.other_meshes, options.progress});
+  const calibration::Fit& fit = found->base.fit;
+  found->rms_mm = rms(fit.residuals.distance_mm);
+  found->held_out_rms_mm = held_out_rms(fit, *found->base.parameters, found->base.nuisances);
+  tell(options, "catalogue");
+  found->errors.emplace(found->base, found->base.nuisances, found->base.size_mm);
+  found->candidates = find_candidates(evaluator, found->base.model, fit, found->unseen);
   tell(options, "effects at their usual size");
-  find_secants(problem, found->candidates);
-  tell(options, "scores");
-  found->table =
-      score_candidates(found->base.solution.residuals, found->sources.mean_mm, found->base.solution.linearisation.slope,
-                       found->candidates, found->whitening, options.seed);
-  judge_base(subject, *found);
-  const bool quiet = is_quiet(*found, options.rules);
-  judge_by_other_poses(subject, options, !quiet || options.correct_quiet_poses, *found);
-  if (!quiet && options.refits > 0)
-    found->refits =
-        refit_candidates(problem, found->candidates, found->table,
-                         worth_refitting(found->table, options.tolerances, subject.fitted.measurements.size(),
-                                         static_cast<std::size_t>(options.refits)));
-  for (const Refit& refit : found->refits)
-    found->left.push_back(refit.solved ? lack_of_fit(refit.fit, found->metric) : LackOfFit{});
-  found->budget = error_budget(found->base, found->sources, found->metric);
-  found->diagnosis = decide(found->table, found->refits, found->left, found->figures, options.rules);
-  settle_named(subject, options, *found);
+  find_secants(subject.scene, found->base, found->candidates);
+  found->table = score_candidates(fit.residuals, found->errors->metric().mean_mm, fit.linearisation.slope, found->candidates,
+                                  found->errors->whitening(), options.seed);
+  tell(options, "evidence");
+  found->hypotheses = Screening(found->base, found->candidates, options.priors).hypotheses();
+  follow(subject, options, *found);
+  found->included = inclusions(found->hypotheses, found->effects(), options.priors);
+  ask_what_was_left_out(subject, *found);
+  find_unexplained(options.seed, *found);
+  found->places = find_places(subject, *found);
+  found->budget = error_budget(*found);
+  found->diagnosis =
+      decide(found->hypotheses, found->effects(), found->included, found->unexplained, options.priors);
   if (found->diagnosis.verdict == Verdict::unexplained) {
     tell(options, "map of missing forces");
-    found->forces = force_map(subject.fitted, found->model, found->base, found->metric, options.seed);
+    const FitErrors known(found->base, found->base.nuisances, 0);
+    found->forces = force_map(subject.scene, found->base.model, fit, known.metric(), options.seed);
   }
   return found;
 }

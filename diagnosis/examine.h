@@ -9,71 +9,72 @@
 
 #include "diagnosis/diagnose.h"
 #include "diagnosis/error_budget.h"
+#include "diagnosis/evidence/base_fit.h"
+#include "diagnosis/evidence/fit_errors.h"
+#include "diagnosis/evidence/set_refit.h"
 #include "diagnosis/force_map.h"
+#include "diagnosis/score_test.h"
+#include "diagnosis/weighted_fit.h"
 
 namespace supine::diagnosis {
 
 /// What is examined. Everything it points to must outlive the findings.
 struct Subject {
-  calibration::MeasuredScene fitted;                ///< poses that the model was fitted to
-  calibration::MeasuredScene whole;                 ///< those, then every other measured pose
-  simulation::Model model;                          ///< calibrated
-  std::vector<double> noise_mm;                     ///< per fitted measurement
-  const simulation::ChainSolution* near = nullptr;  ///< solution of the model, where known
+  calibration::MeasuredScene scene;                 ///< every measured pose
+  simulation::Model given;                          ///< where priors stand
+  simulation::Model start;                          ///< the same with the numbers to begin with
+  std::vector<double> noise_mm;                     ///< per measurement
+  const simulation::ChainSolution* near = nullptr;  ///< solution of `start`, where known
 };
 
 struct ExamineOptions {
-  int refits = 6;            ///< candidates that are added and fitted again, at most; 0 = linear predictions only
-  bool other_meshes = true;  ///< measure the numerical error; false: take it from the residual itself
-  /// Correct poses that are not fitted for the mesh also where nothing stands out: a third of the work then, for one
-  /// figure. Where something does they always are.
-  bool correct_quiet_poses = false;
+  int refits = 5;            ///< sets of effects that are followed through the chain, at most; 0 = straight lines only
+  bool other_meshes = true;  ///< measure the error of the mesh; false: it is taken to have none
   unsigned seed = 1;
-  Tolerances tolerances = {};
-  VerdictRules rules = {};
+  Priors priors = {};
   std::function<void(const std::string&)> progress = {};  ///< may be empty
+};
+
+/// Where a scan lies, beyond where it was said to lie.
+struct ScanPlace {
+  std::string pose;
+  Eigen::Vector3d shift_mm, turn_deg;
+  Eigen::Matrix<double, 6, 1> sd;  ///< mm, then degrees
 };
 
 /// All that one examination finds.
 struct Findings {
-  simulation::Model model;        ///< the base model, its free numbers at the least of F
-  std::vector<std::string> free;  ///< their names
-  WeightedFit base;
-  Metric metric;  ///< points into this object
-  Whitening whitening;
-  ErrorSources sources;
-  Tolerances tolerances;                    ///< of the sources
-  OtherPoses others;                        ///< the base model in poses that it was not fitted to
-  std::optional<NumericalError> numerical;  ///< none where no other mesh was tried, or none gave an answer
-  std::string numerical_failure;            ///< why not
+  BaseFit base;                        ///< a model that lacks nothing
+  double rms_mm = 0, held_out_rms_mm = 0;  ///< of it
   std::vector<Candidate> candidates;
-  std::vector<std::string> unseen;  ///< effects that move no fitted point, here or anywhere
-  ScoreTable table;
-  std::vector<Refit> refits;    ///< best first
-  std::vector<LackOfFit> left;  ///< per refit
-  BaseFigures figures;
+  std::vector<std::string> unseen;     ///< effects that move no fitted point, here or anywhere
+  std::optional<FitErrors> errors;     ///< of the base model, nuisances and the likeliest discrepancy among them
+  ScoreTable table;                    ///< information: what each effect's score says by itself
+  std::vector<Hypothesis> hypotheses;  ///< most probable first
+  std::vector<Refit> refits;           ///< of some of them, the likelier first
+  std::vector<Inclusion> included;     ///< most probable first
+  Unexplained unexplained;             ///< over all hypotheses
+  std::vector<Unexplained> unexplained_by;  ///< of the first hypotheses_told
+  Unexplained left_by_base;                 ///< where nothing is added
+  std::vector<ScanPlace> places;
   ErrorBudget budget;
   Diagnosis diagnosis;
+  Priors priors;
   std::optional<ForceMap> forces;  ///< that would explain what is left; only when unexplained
+
+  static constexpr std::size_t hypotheses_told = 6;
 
   Findings() = default;
   Findings(const Findings&) = delete;
   Findings& operator=(const Findings&) = delete;
+
+  std::vector<std::string> effects() const;       ///< of the candidates
+  const Refit* refit_of(const std::vector<std::string>& effects) const;  ///< of that set; nullptr where there is none
 };
 
-/// The whole examination: numerical error on other meshes, a fit of the base model under all errors, scores of the
-/// catalogue, refits of those that could be it, the verdict. Reads nothing but @p subject.
+/// The whole examination: a fit of the base model with all that is never known, the catalogue weighed along straight
+/// lines, the likeliest sets followed through the chain, probabilities, the verdict. Reads nothing but @p subject.
 /// @throws NumericalFailure  no equilibrium of the model as given
 std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& options);
-
-/// What refits of the findings' candidates start from. Points into both.
-RefitProblem refit_problem(const Subject& subject, const Findings& found,
-                           const std::function<void(const std::string&)>& progress);
-
-/// Effects worth a refit: of those whose T − 2q is within reach of the best, the @p count with the largest T − 2q
-/// without the tolerance for the effect itself.
-/// @param poses  that are fitted
-std::vector<std::string> worth_refitting(const ScoreTable& table, const Tolerances& tolerances, std::size_t poses,
-                                         std::size_t count);
 
 }  // namespace supine::diagnosis

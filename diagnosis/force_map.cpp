@@ -150,9 +150,8 @@ double quantile95(std::vector<double> values) {
 
 }  // namespace
 
-ForceMap force_map(const calibration::MeasuredScene& scene, const simulation::Model& model, const WeightedFit& fit,
+ForceMap force_map(const calibration::MeasuredScene& scene, const simulation::Model& model, const calibration::Fit& f,
                    const Metric& metric, unsigned seed, int draws) {
-  const calibration::Fit& f = fit.solution;
   const calibration::ModelSkin skin(*scene.mesh, f.prediction.solution.poses[0].x);
   const Points nodes = skin.node_points();
   double width = 1;

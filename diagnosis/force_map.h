@@ -27,7 +27,7 @@ struct ForceMap {
 /// where larger): the level that noise alone reaches in a map as free as this one. Only the first fitted pose is looked
 /// at.
 /// @throws NumericalFailure  the tangent of a pose is singular
-ForceMap force_map(const calibration::MeasuredScene& scene, const simulation::Model& model, const WeightedFit& fit,
+ForceMap force_map(const calibration::MeasuredScene& scene, const simulation::Model& model, const calibration::Fit& f,
                    const Metric& metric, unsigned seed, int draws = 100);
 
 }  // namespace supine::diagnosis

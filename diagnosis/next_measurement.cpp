@@ -10,6 +10,7 @@
 #include "calibration/model_skin.h"
 #include "calibration/scan_motion.h"
 #include "common/error.h"
+#include "common/rms.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
@@ -27,15 +28,15 @@ struct Option {
 
 /// From the gravity of the fitted pose and the patient's own directions (LPS: +z is the head).
 std::vector<Option> options_of(const Subject& subject) {
-  const Eigen::Vector3d down = subject.fitted.measurements[0]->pose.gravity, feet(0, 0, -1);
+  const Eigen::Vector3d down = subject.scene.measurements[0]->pose.gravity, feet(0, 0, -1);
   const auto tilted = [&down](double degrees, const Eigen::Vector3d& to) -> Eigen::Vector3d {
     const double a = degrees * std::numbers::pi / 180;
     return (std::cos(a) * down + std::sin(a) * to).normalized();
   };
-  const Eigen::Vector3d& lateral = subject.fitted.anatomy->lateral;
+  const Eigen::Vector3d& lateral = subject.scene.anatomy->lateral;
   const std::string side = lateral.x() > 0 ? "left" : "right";
-  const bool several = subject.fitted.measurements.size() > 1;
-  const std::string again = several ? "all that was fitted" : subject.fitted.measurements[0]->pose.name;
+  const bool several = subject.scene.measurements.size() > 1;
+  const std::string again = several ? "all that was fitted" : subject.scene.measurements[0]->pose.name;
   return {{again + ", once more", down, true},
           {"tilted 45 degrees, head up", tilted(45, feet)},
           {"tilted 45 degrees to the patient's " + side, tilted(45, lateral)},
@@ -49,8 +50,8 @@ struct Slopes {
 };
 
 Slopes present(const Findings& found, const std::vector<const Candidate*>& effects) {
-  Slopes slopes{found.whitening.apply(found.base.solution.linearisation.slope), {}};
-  for (const Candidate* effect : effects) slopes.effect.push_back(found.whitening.apply(effect->slope));
+  Slopes slopes{found.errors->whitening().apply(found.base.fit.linearisation.slope), {}};
+  for (const Candidate* effect : effects) slopes.effect.push_back(found.errors->whitening().apply(effect->slope));
   return slopes;
 }
 
@@ -60,13 +61,13 @@ class Pose {
   Pose(const Subject& subject, const Findings& found, const Option& option)
       : found_(found),
         load_{option.name, option.down},
-        chain_(*subject.fitted.mesh, *subject.fitted.anatomy, found.model, {subject.fitted.prone, load_}) {
-    simulation::ChainSolution near = found.base.solution.prediction.solution;
+        chain_(*subject.scene.mesh, *subject.scene.anatomy, found.base.model, {subject.scene.prone, load_}) {
+    simulation::ChainSolution near = found.base.fit.prediction.solution;
     near.poses.resize(1);
     near.poses[0].name = option.name;
-    solution_ = chain_.solve(found.model, &near);
-    sensitivities_ = std::make_unique<simulation::Sensitivities>(chain_, found.model, solution_);
-    const calibration::ModelSkin skin(*subject.fitted.mesh, solution_.poses[0].x);
+    solution_ = chain_.solve(found.base.model, &near);
+    sensitivities_ = std::make_unique<simulation::Sensitivities>(chain_, found.base.model, solution_);
+    const calibration::ModelSkin skin(*subject.scene.mesh, solution_.poses[0].x);
     nodes_ = skin.nodes();
     place_ = skin.node_points();
     normal_ = skin.node_normals();
@@ -75,9 +76,11 @@ class Pose {
 
   Eigen::MatrixXd white(const Eigen::MatrixXd& columns) const { return factor_.matrixL().solve(columns); }
 
+  Eigen::Index points() const { return place_.rows(); }
+
   Eigen::VectorXd slope(const std::string& parameter) {
     const simulation::ChainDerivative derivative = sensitivities_->of(parameter);
-    const auto fields = chain_.fields(found_.model, load_, parameter);
+    const auto fields = chain_.fields(found_.base.model, load_, parameter);
     Points moved = Points::Zero(place_.rows(), 3);
     if (!simulation::derivatives_of(fields).scan_motion.isZero(0))
       moved = calibration::corrected_derivative(fields.scan_motion, place_);
@@ -89,21 +92,21 @@ class Pose {
   /// Noise of as many points per node as the fitted scan has, what the mesh does, and the scan's own place.
   void factorise() {
     const Eigen::Index n = place_.rows();
-    const auto scans = found_.base.solution.prediction.poses.size();
-    const double points = static_cast<double>(found_.base.solution.residuals.size()) / static_cast<double>(scans * n);
-    const double nugget = found_.sources.noise_mm.squaredNorm() / static_cast<double>(found_.sources.noise_mm.size()) /
-                          std::max(1.0, points);
-    const double shared = found_.sources.spread_mm * found_.sources.spread_mm;
+    const auto scans = found_.base.fit.prediction.poses.size();
+    const double points = static_cast<double>(found_.base.fit.residuals.size()) / static_cast<double>(scans * n);
+    const double nugget = mean_square(found_.base.noise_of_point_mm) / std::max(1.0, points);
+    const auto& mesh = found_.base.numerical;
+    const double shared = mesh ? mesh->spread_mm * mesh->spread_mm : 0, length_mm = mesh ? mesh->length_mm : 1;
     Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(n, n);
     const simulation::Effect& place = simulation::place_of_scan();
     for (const auto& row : place.parameters()) {
       const Eigen::VectorXd mode =
-          place.tolerance(row.unit, found_.tolerances) * slope(simulation::parameter_name(place, row));
+          place.tolerance(row.unit, found_.priors.known) * slope(simulation::parameter_name(place, row));
       sigma.noalias() += mode * mode.transpose();
     }
     for (Eigen::Index i = 0; i < n; ++i)
       for (Eigen::Index j = 0; j <= i; ++j)
-        sigma(i, j) += shared * std::exp(-(place_.row(i) - place_.row(j)).norm() / found_.sources.length_mm) +
+        sigma(i, j) += shared * std::exp(-(place_.row(i) - place_.row(j)).norm() / length_mm) +
                        (i == j ? nugget : 0);
     factor_.compute(sigma);
   }
@@ -122,9 +125,9 @@ Slopes further(const Subject& subject, const Findings& found, const Option& opti
                const std::vector<const Candidate*>& effects, const Slopes& now) {
   if (option.again) return now;
   Pose pose(subject, found, option);
-  const calibration::FreeParameters parameters(found.model);
-  const Eigen::VectorXd unit = parameters.slope(found.base.solution.u);
-  const auto rows = pose.slope(found.free.empty() ? std::string() : found.free[0]).size();
+  const calibration::FreeParameters& parameters = *found.base.parameters;
+  const Eigen::VectorXd unit = parameters.slope(found.base.fit.u);
+  const auto rows = pose.points();
   Slopes slopes{Eigen::MatrixXd(rows, parameters.size()), {}};
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
     slopes.base.col(i) = unit[i] * pose.slope(parameters.names()[static_cast<std::size_t>(i)]);

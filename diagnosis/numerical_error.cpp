@@ -96,20 +96,6 @@ Eigen::VectorXd change_of(const Residuals& residuals, const calibration::Predict
   return change;
 }
 
-/// The same of all points of the measurements from @p first on.
-std::vector<Eigen::VectorXd> change_of_others(std::size_t first, const calibration::Prediction& given,
-                                              const calibration::Prediction& finer) {
-  std::vector<Eigen::VectorXd> all;
-  for (std::size_t m = first; m < given.poses.size(); ++m) {
-    const auto &before = given.poses[m].distances, &after = finer.poses[m].distances;
-    Eigen::VectorXd change = after.distance_mm - before.distance_mm;
-    for (Eigen::Index i = 0; i < change.size(); ++i)
-      if (before.closest.on_border[i] || after.closest.on_border[i]) change[i] = 0;
-    all.push_back(std::move(change));
-  }
-  return all;
-}
-
 /// Fills finer_mm and what it comes from.
 /// @param near  or nullptr
 void measure_finer(const calibration::MeasuredScene& scene, const simulation::Model& model, const calibration::Fit& fit,
@@ -213,34 +199,6 @@ NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, 
   }
   summarise(scene, fit.residuals, result);
   return result;
-}
-
-std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::MeasuredScene& whole,
-                                                    const NumericalError& fitted) {
-  const std::size_t count = fitted.finer.poses.size();
-  if (count == 0 || whole.measurements.size() == count) return {};
-  // They only confirm: a pose that does not come out in a few steps is left as it is.
-  simulation::SolveOptions few = enough_from_near();
-  few.max_iterations = 16;
-  try {
-    const meshing::TetMesh mesh = meshing::to_quadratic(*whole.mesh);
-    simulation::ChainSolution linear = fitted.given;
-    for (std::size_t m = count; m < whole.measurements.size(); ++m)
-      linear.poses.push_back({.name = whole.measurements[m]->pose.name, .x = linear.X, .report = {}});
-    const calibration::Prediction given =
-        calibration::Evaluator(whole, fitted.model, accurate_enough()).predict(fitted.model, &linear);
-    simulation::ChainSolution start = fitted.finer;
-    const Points X = on_quadratic(mesh, given.solution.X);
-    for (std::size_t p = count; p < given.solution.poses.size(); ++p) {
-      const simulation::PoseSolution& pose = given.solution.poses[p];
-      const Points x = on_quadratic(mesh, pose.x);
-      start.poses.push_back(
-          {.name = pose.name, .x = simulation::pushed_forward(mesh.cells, x, X, start.X), .report = {}});
-    }
-    return change_of_others(count, given, predicted_on(whole, mesh, fitted.model, &start, few));
-  } catch (const NumericalFailure&) {
-    return {};
-  }
 }
 
 }  // namespace supine::diagnosis

@@ -34,15 +34,6 @@ struct NumericalError {
 NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, const simulation::Model& model,
                                        const calibration::Fit& fit, const NumericalError* near = nullptr);
 
-/// Change of distance that finer elements make for every scan point of the measurements that are not fitted, in the
-/// order of the scene; 0 where the point lies beyond the border. Empty for quadratic meshes, and where a pose does not
-/// come out in a few steps.
-/// @param whole   the scene that @p fitted was measured in and, after its measurements, those that are not fitted
-/// @param fitted  what measure_numerical_error() found
-/// @return mm, #P of each scan that is not fitted
-std::vector<Eigen::VectorXd> measure_unfitted_error(const calibration::MeasuredScene& whole,
-                                                    const NumericalError& fitted);
-
 /// Length l of exp(−r/l) that fits the correlation of neighbours in @p field, a change over the residuals' points with
 /// or without a mean; between 5 and 60 mm.
 double correlation_length_mm(const calibration::Residuals& residuals, const Eigen::VectorXd& field);

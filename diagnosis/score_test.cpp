@@ -174,14 +174,6 @@ double power_of(const ScoreTable& table, int freedom, double noncentrality) {
   return chi_squared_power(freedom, noncentrality, table.chance_bic + freedom * std::log(table.effective_points));
 }
 
-double statistic_without(const Score& score, double tolerance) {
-  constexpr double least_share = 0.1;  // of the variance: the slope was another where the tolerance was set
-  if (score.step.size() != 1) return score.statistic;
-  const double variance = score.step_sd[0] * score.step_sd[0];
-  const double rest = std::max(variance - tolerance * tolerance, least_share * variance);
-  return std::max(score.statistic, score.slope_statistic * variance / rest);
-}
-
 ScoreTable score_candidates(const Residuals& residuals, const Eigen::VectorXd& mean_mm, const Eigen::MatrixXd& slope,
                             const std::vector<Candidate>& candidates, const Whitening& whitening, unsigned seed) {
   const Scorer scorer(residuals, mean_mm, slope, candidates, whitening);

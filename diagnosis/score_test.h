@@ -46,12 +46,6 @@ struct ScoreTable {
 /// Chance that an effect of @p freedom directions and @p noncentrality scores above chance, noise added.
 double power_of(const ScoreTable& table, int freedom, double noncentrality);
 
-/// T as it is under a Σ without the tolerance of the effect's one parameter: the one-step value t does not feel it, its
-/// variance does, so that T = t²/var becomes t²/(var − tolerance²) (Sherman and Morrison), ten times T at most. T
-/// itself with several parameters.
-/// @param tolerance  1 sigma of t, in the parameter's unit
-double statistic_without(const Score& score, double tolerance);
-
 /// Projected score test (Rao's; Lagrange multiplier) of every candidate. With d̃ = L⁻¹d, S̃ = L⁻¹S and Q an orthonormal
 /// basis of what recalibration can absorb, M = I − QQᵀ:
 ///   T = ‖P(M S̃) M d̃‖²,   φ̂ = φ⁰ − (M S̃)⁺ M d̃;   T = 0 where a one-sided φ̂ is below its null.

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "calibration/error_model.h"
-#include "diagnosis/error_sources.h"
 
 namespace supine::diagnosis {
 
@@ -15,12 +14,8 @@ class Whitening {
  public:
   /// Every point errs by itself, by sigma_mm of the residuals. All points are kept.
   static Whitening independent(const calibration::Residuals& residuals);
-  /// Σ of an error model, on the means of at most @p most clusters of points (a dense factorisation).
-  static Whitening correlated(const calibration::Residuals& residuals, const calibration::ErrorModel& errors,
-                              Eigen::Index most = 900);
-
-  /// Σ of all sources, on the means of clusters. effective_points() is that of noise and spread, without the modes.
-  static Whitening of(const calibration::Residuals& residuals, const ErrorSources& sources, Eigen::Index most = 600);
+  /// A covariance of clusters' means as it is, #clusters by #clusters, mm². effective_points() is their number.
+  static Whitening given(const calibration::Clusters& clusters, const Eigen::MatrixXd& covariance);
 
   Eigen::MatrixXd apply(const Eigen::MatrixXd& columns) const;
   /// Independent points these errors are worth, (tr Σ)²/tr(Σ²), of all the residuals.
@@ -29,10 +24,6 @@ class Whitening {
   const calibration::Clusters& clusters() const { return clusters_; }
 
  private:
-  /// @param spread_mm  of each cluster
-  void factorise(const Eigen::VectorXd& nugget, const Eigen::VectorXd& spread_mm, double length_mm,
-                 const Eigen::MatrixXd& modes);
-
   Eigen::VectorXd sigma_;               // independent
   calibration::Clusters clusters_;      // correlated
   Eigen::LLT<Eigen::MatrixXd> factor_;  // correlated

@@ -70,6 +70,9 @@ struct Model {
     Setting stiffness_kpa_per_mm{1.0};
   } cut;
   std::vector<EffectSetting> effects;
+  /// What differs from pose to pose, by the pose's name: where its scan lies, how gravity falls in it. Acts after the
+  /// effects and on top of them; no parameter stands for its numbers.
+  std::map<std::string, std::vector<EffectSetting>> of_pose;
 };
 
 }  // namespace supine::simulation

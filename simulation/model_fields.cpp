@@ -131,6 +131,9 @@ Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Ve
     if (!present && varied.starts_with(effect->name() + "."))
       apply_effect(*effect, null_setting(*effect), scene, varied, fields);
   }
+  if (const auto own = model.of_pose.find(scene.pose); own != model.of_pose.end())
+    for (const EffectSetting& setting : own->second)
+      apply_effect(*find_effect(setting.name), setting, scene, {}, fields);
   return fields;
 }
 

@@ -98,12 +98,13 @@ calibration::MeasuredScene MeasuredCase::fitted_scene() const { return scene_of(
 calibration::MeasuredScene MeasuredCase::whole_scene() const { return scene_of(*this, true); }
 
 std::vector<double> MeasuredCase::noise_mm(calibration::Evaluator& evaluator) const {
+  const auto& measurements = evaluator.scene().measurements;
   std::vector<double> noise;
-  const std::vector<double> placeholder(fitted.size(), 1.0);
+  const std::vector<double> placeholder(measurements.size(), 1.0);
   calibration::Prediction prediction;
-  for (std::size_t m = 0; m < fitted.size(); ++m) {
-    if (fitted[m].noise_mm) {
-      noise.push_back(*fitted[m].noise_mm);
+  for (std::size_t m = 0; m < measurements.size(); ++m) {
+    if (measurements[m]->noise_mm) {
+      noise.push_back(*measurements[m]->noise_mm);
       continue;
     }
     if (prediction.poses.empty()) prediction = evaluator.predict(model, &start);

@@ -30,8 +30,8 @@ struct MeasuredCase {
   /// Only what is fitted, or all of it.
   calibration::MeasuredScene fitted_scene() const;
   calibration::MeasuredScene whole_scene() const;
-  /// Of each fitted measurement: as the case says, or estimated from the distances to the given model.
-  /// @param evaluator  of fitted_scene()
+  /// Of each measurement of a scene: as the case says, or estimated from the distances to the given model.
+  /// @param evaluator  of fitted_scene() or whole_scene()
   std::vector<double> noise_mm(calibration::Evaluator& evaluator) const;
 };
 

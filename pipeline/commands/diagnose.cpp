@@ -2,11 +2,14 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "common/error.h"
+#include "pipeline/case/model_file.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/results/diagnosis_report.h"
 #include "pipeline/results/ladder_report.h"
+#include "simulation/parameters.h"
 
 namespace supine::pipeline {
 namespace {
@@ -42,24 +45,22 @@ class DiagnoseTool : public Tool {
     app.add_option("mesh", mesh_file_, "imaged mesh, as supine-tetrahedralise writes it (.vtu)")->required();
     app.add_option("--model", model_file_,
                    "calibrated model (default: model.toml beside the mesh, as supine-calibrate writes it)");
-    app.add_option(
-           "--refit", options_.refits,
-           "the N candidates with the largest T - 2q without the tolerance for the effect itself, of those within "
-           "reach of the best, are added and fitted again; "
-           "0 = none, then nothing is named")
+    app.add_option("--refit", options_.refits,
+                   "the N likeliest sets of effects are followed through the whole chain, at most; 0 = straight lines")
         ->check(CLI::Range(0, 100))
         ->capture_default_str();
     app.add_flag("--no-other-meshes", no_other_meshes_,
-                 "do not solve on two other meshes: the error of the mesh is then guessed from the residual");
-    app.add_option("--registration-mm", options_.tolerances.registration_mm,
-                   "how well the scan's place is known, 1 sigma per direction; its turn goes with it")
+                 "do not solve on two other meshes: the mesh is then taken to be exact");
+    app.add_option("--registration-mm", options_.priors.known.registration_mm,
+                   "how well each scan's place is known, 1 sigma per direction, mm; its turn goes with it, 0.75 degrees "
+                   "per mm. 0.3 where markers were used")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
-    app.add_option("--segmentation-mm", options_.tolerances.segmentation_mm,
+    app.add_option("--segmentation-mm", options_.priors.known.segmentation_mm,
                    "how well the imaged skin's place is known, 1 sigma")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
-    app.add_option("--chest-wall-mm", options_.tolerances.chest_wall_mm,
+    app.add_option("--chest-wall-mm", options_.priors.known.chest_wall_mm,
                    "how far breath may move the muscle between two scans, 1 sigma")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
@@ -75,19 +76,19 @@ class DiagnoseTool : public Tool {
     check_model_target(run);
     announce_png(run, png_, folder() / "diagnosis.vtp");
     const auto measured = read_measured_case(run, case_folder_, mesh_file_, model());
-    calibration::Evaluator evaluator(measured->fitted_scene(), measured->model);
+    calibration::Evaluator evaluator(measured->whole_scene(), measured->model);
     const std::vector<double> noise = measured->noise_mm(evaluator);
     run.stage("examine");
     LiveProgress live(run, std::chrono::seconds(0));
     options_.other_meshes = !no_other_meshes_;
-    options_.tolerances.registration_rad = options_.tolerances.registration_mm / turn_arm_mm;
+    options_.priors.known.registration_rad = turn_per_mm * options_.priors.known.registration_mm;
     options_.progress = [&live](const std::string& what) { live.show(what); };
-    auto found = diagnosis::examine(subject_of(*measured, measured->model, noise), options_);
-    if (!found->numerical)
-      run.warn("the error of the mesh is guessed from the residual (" + found->numerical_failure + ")");
+    const simulation::Model given = given_model(run, *measured);
+    auto found = diagnosis::examine(subject_of(*measured, given, noise), options_);
+    if (!found->base.numerical)
+      run.warn("the mesh is taken to be exact (" + found->base.numerical_failure + ")");
     else
-      warn_of_missing_mesh(run, *found->numerical);
-    if (!found->others.failure.empty()) run.warn("scans that are not fitted judge nothing: " + found->others.failure);
+      warn_of_missing_mesh(run, *found->base.numerical);
     run.stage("next measurement");
     live.show("further measurements");
     const DiagnosisResult result = complete(*measured, std::move(found));
@@ -98,7 +99,7 @@ class DiagnoseTool : public Tool {
     say_diagnosis(run, result);
     if (ladder_) {
       run.stage("ladder");
-      const auto ladder = diagnosis::climb(subject_of(*measured, measured->model, noise), options_, *result.found);
+      const auto ladder = diagnosis::climb(subject_of(*measured, given, noise), options_, *result.found);
       run.figures(folder() / "ladder.json") = ladder_figures(ladder);
       write_models(run, ladder, measured->model_file);
       say_ladder(run, ladder);
@@ -107,7 +108,15 @@ class DiagnoseTool : public Tool {
   }
 
  private:
-  static constexpr double turn_arm_mm = 83;  // about the radius of a breast: 0.3 mm there are 0.0036 rad
+  static constexpr double turn_per_mm = 0.75 * std::numbers::pi / 180;  // rad: 1.5 degrees go with 2 mm
+
+  /// Where priors stand: the case's own model where it has the same effects, else the calibrated one.
+  simulation::Model given_model(Run& run, const MeasuredCase& measured) const {
+    const fs::path file = case_folder_ / "model.toml";
+    if (!fs::exists(file)) return measured.model;
+    const simulation::Model own = read_model(run.input(file));
+    return simulation::free_parameters(own) == simulation::free_parameters(measured.model) ? own : measured.model;
+  }
 
   fs::path model() const {
     if (!model_file_.empty()) return model_file_;

@@ -25,14 +25,17 @@ const diagnosis::Candidate& candidate_of(const Findings& found, const std::strin
                        [&effect](const diagnosis::Candidate& c) { return c.effect == effect; });
 }
 
+/// Of the most probable set that was refitted and holds the effect.
 const Refit* refit_of(const Findings& found, const std::string& effect) {
   for (const Refit& refit : found.refits)
-    if (refit.effect == effect && refit.solved) return &refit;
+    if (refit.solved && std::find(refit.effects.begin(), refit.effects.end(), effect) != refit.effects.end())
+      return &refit;
   return nullptr;
 }
 
 std::vector<std::string> rivals_of(const Findings& found, const std::string& effect) {
   std::vector<std::string> names;
+  if (found.diagnosis.verdict != Verdict::ambiguous) return names;
   const auto& set = found.diagnosis.missing;
   if (std::find(set.begin(), set.end(), effect) == set.end()) return names;
   for (const std::string& other : set)
@@ -45,7 +48,8 @@ Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, 
   Json list = Json::array();
   if (refit != nullptr) {
     for (const auto& p : refit->parameters)
-      list.push_back({{"name", p.name}, {"value", p.value}, {"unit", p.unit}, {"interval95", {p.low, p.high}}});
+      if (p.name.starts_with(candidate.effect + "."))
+        list.push_back({{"name", p.name}, {"value", p.value}, {"unit", p.unit}, {"interval95", {p.low, p.high}}});
     return list;
   }
   for (Eigen::Index k = 0; k < score.step.size(); ++k) {
@@ -59,38 +63,76 @@ Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, 
   return list;
 }
 
-Json number_or_null(const std::vector<double>& values) { return values.empty() ? Json(nullptr) : Json(values); }
-
-Json left_json(const diagnosis::LackOfFit& left) { return {{"misfit", left.misfit}, {"p_value", left.p_value}}; }
+const diagnosis::Inclusion& included_of(const Findings& found, const std::string& effect) {
+  return *std::find_if(found.included.begin(), found.included.end(),
+                       [&effect](const diagnosis::Inclusion& one) { return one.effect == effect; });
+}
 
 Json candidate_json(const Findings& found, const Score& score) {
   const Refit* refit = refit_of(found, score.effect);
-  const bool judged = refit && unfitted_scans_judge(*refit, found.others.unfitted);
-  return {
-      {"effect", score.effect},
-      {"p_value", score.p_value},
-      {"predicted_rms_mm", score.predicted_rms_mm},
-      {"refit_rms_mm", refit ? Json(refit->rms_mm) : Json(nullptr)},
-      {"held_out_rms_mm", refit ? refit->held_out_rms_mm : score.predicted_held_out_rms_mm},
-      {"held_out_pose_rms_mm", refit ? number_or_null(refit->pose_rms_mm) : Json(nullptr)},
-      {"changes_pose_mm", refit ? number_or_null(refit->pose_change_mm) : Json(nullptr)},
-      {"pose_gain", judged ? Json(refit->pose_gain) : Json(nullptr)},
-      {"pose_misfit", judged ? Json(refit->pose_misfit) : Json(nullptr)},
-      {"left", refit ? left_json(found.left[static_cast<std::size_t>(refit - found.refits.data())]) : Json(nullptr)},
-      {"parameters", parameters_json(candidate_of(found, score.effect), score, refit)},
-      {"not_told_apart_from", rivals_of(found, score.effect)},
-      {"same_shape_as", score.not_told_apart_from},
-      {"statistic", score.statistic},
-      {"freedom", score.freedom},
-      {"bic", score.bic},
-      {"refit_bic", refit ? Json(refit->bic) : Json(nullptr)},
-      {"refit_finished", refit ? Json(refit->finished) : Json(nullptr)},
-      {"at_border", refit ? Json(refit->at_border) : Json(nullptr)},
-      {"wrong_sign", score.wrong_sign},
-      {"beyond_range", score.beyond_range},
-      {"predicted_held_out_rms_mm", score.predicted_held_out_rms_mm},
-      {"noncentrality", score.noncentrality},
-      {"power", score.power}};
+  return {{"effect", score.effect},
+          {"probability", included_of(found, score.effect).probability},
+          {"p_value", score.p_value},
+          {"predicted_rms_mm", score.predicted_rms_mm},
+          {"refit_rms_mm", refit ? Json(refit->rms_mm) : Json(nullptr)},
+          {"held_out_rms_mm", refit ? refit->held_out_rms_mm : score.predicted_held_out_rms_mm},
+          {"parameters", parameters_json(candidate_of(found, score.effect), score, refit)},
+          {"not_told_apart_from", rivals_of(found, score.effect)},
+          {"same_shape_as", score.not_told_apart_from},
+          {"statistic", score.statistic},
+          {"freedom", score.freedom},
+          {"at_border", refit ? Json(refit->at_border) : Json(nullptr)},
+          {"wrong_sign", score.wrong_sign},
+          {"beyond_range", score.beyond_range},
+          {"predicted_held_out_rms_mm", score.predicted_held_out_rms_mm},
+          {"noncentrality", score.noncentrality},
+          {"power", score.power}};
+}
+
+Json names_of(const Findings& found, const diagnosis::Hypothesis& h) {
+  Json names = Json::array();
+  for (const int effect : h.effects) names.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);
+  return names;
+}
+
+Json hypotheses_json(const Findings& found) {
+  Json list = Json::array();
+  for (std::size_t h = 0; h < found.unexplained_by.size(); ++h) {
+    const diagnosis::Hypothesis& one = found.hypotheses[h];
+    const diagnosis::Unexplained& left = found.unexplained_by[h];
+    list.push_back({{"effects", names_of(found, one)},
+                    {"probability", one.probability},
+                    {"refitted", one.refitted},
+                    {"unexplained_mm", left.mean_mm},
+                    {"unexplained95", {left.low_mm, left.high_mm}}});
+  }
+  return list;
+}
+
+Json included_json(const Findings& found) {
+  Json list = Json::array();
+  for (const diagnosis::Inclusion& one : found.included)
+    list.push_back({{"effect", one.effect},
+                    {"probability", one.probability},
+                    {"bayes_factor", one.bayes_factor},
+                    {"left_out_gain", one.left_out_gain}});
+  return list;
+}
+
+Json registration_json(const Findings& found) {
+  Json list = Json::array();
+  for (const diagnosis::ScanPlace& place : found.places)
+    list.push_back({{"pose", place.pose},
+                    {"shift_mm", {place.shift_mm[0], place.shift_mm[1], place.shift_mm[2]}},
+                    {"turn_deg", {place.turn_deg[0], place.turn_deg[1], place.turn_deg[2]}},
+                    {"sd", std::vector<double>(place.sd.begin(), place.sd.end())}});
+  return list;
+}
+
+Json nuisances_json(const Findings& found) {
+  Json list = Json::object();
+  for (const auto& nuisance : found.base.nuisances) list[nuisance.name()] = nuisance.value;
+  return list;
 }
 
 Json alike_json(const diagnosis::ScoreTable& table) {
@@ -103,17 +145,18 @@ Json alike_json(const diagnosis::ScoreTable& table) {
 }
 
 Json budget_json(const diagnosis::ErrorBudget& b) {
-  return {{"total", b.total},         {"noise", b.noise},           {"registration", b.registration},
-          {"numerical", b.numerical}, {"parameters", b.parameters}, {"model_form", b.model_form}};
+  return {{"total", b.total},           {"noise", b.noise},           {"registration", b.registration},
+          {"numerical", b.numerical},   {"parameters", b.parameters}, {"patchiness", b.patchiness},
+          {"model_form", b.model_form}};
 }
 
 Json numerical_json(const Findings& found) {
-  if (!found.numerical) return {{"failed", found.numerical_failure}};
+  if (!found.base.numerical) return {{"failed", found.base.numerical_failure}};
   Json failed = Json::array();
-  const diagnosis::NumericalError& error = *found.numerical;
+  const diagnosis::NumericalError& error = *found.base.numerical;
   if (!error.finer_failure.empty()) failed.push_back("finer mesh: " + error.finer_failure);
   if (!error.coarser_failure.empty()) failed.push_back("coarser mesh: " + error.coarser_failure);
-  return {{"spread_mm", found.sources.spread_mm}, {"length_mm", found.sources.length_mm}, {"failed", failed}};
+  return {{"spread_mm", error.spread_mm}, {"length_mm", error.length_mm}, {"failed", failed}};
 }
 
 Json forces_json(const Findings& found) {
@@ -122,7 +165,7 @@ Json forces_json(const Findings& found) {
   const Eigen::VectorXd size = map.force_kpa.rowwise().norm();
   Eigen::Index place;
   const double largest = size.maxCoeff(&place);
-  const auto at = found.base.solution.residuals.place.row(place);
+  const auto at = found.base.fit.residuals.place.row(place);
   return {{"meaning", "a hint, no diagnosis"},
           {"largest_kpa", largest},
           {"largest_at_mm", {at[0], at[1], at[2]}},
@@ -142,39 +185,29 @@ std::string values_of(const std::vector<diagnosis::FittedParameter>& parameters)
   return text;
 }
 
-void say_scores(const Run& run, const Findings& found) {
-  run.say(fmt::format("  {:<20}{:>9}{:>4}{:>9}{:>8}{:>7}   {}", "if it had", "T", "q", "BIC", "p", "power",
-                      "one-step size"));
-  for (const Score& score : found.table.scores) {
-    const auto& candidate = candidate_of(found, score.effect);
-    std::string sizes;
-    for (Eigen::Index k = 0; k < score.step.size(); ++k) {
-      const auto& p = candidate.parameters[static_cast<std::size_t>(k)];
-      sizes += fmt::format("{}{:.3g}{}", k > 0 ? ", " : "", score.step[k], p.unit == "1" ? "" : " " + p.unit);
-    }
-    run.say(fmt::format("  {:<20}{:>9.1f}{:>4}{:>9.1f}{:>8.3f}{:>7.2f}   {}{}{}", score.effect, score.statistic,
-                        score.freedom, score.bic, score.p_value, score.power, sizes,
-                        score.wrong_sign ? " (wrong sign)" : "", score.beyond_range ? " (implausible size)" : ""));
-  }
+std::string joined(const std::vector<std::string>& names, const char* between) {
+  return fmt::format("{}", fmt::join(names, between));
 }
 
-void say_refits(const Run& run, const Findings& found) {
-  if (found.refits.empty()) return;
-  run.say(fmt::format("  {:<20}{:>9}{:>8}{:>10}{:>10}{:>8}{:>8}   {}", "added, fitted again", "BIC", "RMS", "held out",
-                      "pose", "gain", "misfit", "values"));
-  for (std::size_t r = 0; r < found.refits.size(); ++r) {
-    const Refit& refit = found.refits[r];
-    if (!refit.solved)
-      run.say(fmt::format("  {:<20}  no equilibrium", refit.effect));
-    else
-      run.say(fmt::format(
-          "  {:<20}{:>9.1f}{:>8.3f}{:>10.3f}{:>10}{:>8}{:>8.2f}   {}{}", refit.effect, refit.bic, refit.rms_mm,
-          refit.held_out_rms_mm, refit.pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", refit.pose_rms_mm[0]),
-          unfitted_scans_judge(refit, found.others.unfitted) ? fmt::format("{:.1f}", refit.pose_gain) : "-",
-          found.left[r].misfit, values_of(refit.parameters),
-          !refit.finished   ? " (given up early)"
-          : refit.at_border ? " (place or width at the border of its range)"
-                            : ""));
+void say_places(const Run& run, const Findings& found) {
+  for (const diagnosis::ScanPlace& place : found.places)
+    run.say(fmt::format("  the {} scan lies {:.1f} ± {:.1f} mm and {:.1f} ± {:.1f}° from where it was said to lie",
+                        place.pose, place.shift_mm.norm(), place.sd.head<3>().norm() / std::sqrt(3.0),
+                        place.turn_deg.norm(), place.sd.tail<3>().norm() / std::sqrt(3.0)));
+}
+
+void say_hypotheses(const Run& run, const Findings& found) {
+  constexpr double worth_a_line = 0.01;
+  for (std::size_t h = 0; h < found.unexplained_by.size(); ++h) {
+    const diagnosis::Hypothesis& one = found.hypotheses[h];
+    if (one.probability < worth_a_line && h > 0) continue;
+    std::vector<std::string> names;
+    for (const int effect : one.effects) names.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);
+    const Refit* refit = names.empty() ? nullptr : found.refit_of(names);
+    const diagnosis::Unexplained& left = found.unexplained_by[h];
+    run.say(fmt::format("  {:<34}{:>6.2f}      unexplained {:.1f} mm [{:.1f}, {:.1f}]     {}",
+                        names.empty() ? "nothing missing" : joined(names, " + "), one.probability, left.mean_mm,
+                        left.low_mm, left.high_mm, refit ? values_of(refit->parameters) : ""));
   }
 }
 
@@ -187,45 +220,33 @@ std::string where(const std::vector<diagnosis::HotSpot>& spots) {
   return text.empty() ? "nowhere by more than noise" : text;
 }
 
-/// ", unfitted pose 1.17 -> 0.92 mm"; empty where there is none.
-std::string pose_fall(const Findings& found, const Refit& refit) {
-  const auto& before = found.figures.pose_rms_mm;
-  if (before.empty() || before.size() != refit.pose_rms_mm.size()) return {};
-  const bool none_fitted = found.figures.unfitted_poses == before.size();
-  std::string text = fmt::format(", {} pose{}", none_fitted ? "unfitted" : "left-out", before.size() == 1 ? "" : "s");
-  for (std::size_t i = 0; i < before.size(); ++i)
-    text += fmt::format("{} {:.2f} -> {:.2f}", i > 0 ? "," : "", before[i], refit.pose_rms_mm[i]);
-  return text + " mm";
-}
-
-/// The lowest of what is named.
-double p_of_named(const Findings& found) {
-  double p = 1;
-  for (const Score& score : found.table.scores)
-    for (const std::string& name : found.diagnosis.missing)
-      if (score.effect == name) p = std::min(p, score.p_value);
-  return p;
+/// "ligament (0.98) and adhesion (0.96)".
+std::string with_probabilities(const Findings& found) {
+  std::vector<std::string> named;
+  for (const std::string& name : found.diagnosis.missing)
+    named.push_back(fmt::format("{} ({:.2f})", name, included_of(found, name).probability));
+  return joined(named, found.diagnosis.verdict == Verdict::missing ? " and " : " or ");
 }
 
 void say_verdict(const Run& run, const Findings& found) {
   const diagnosis::Diagnosis& d = found.diagnosis;
-  const std::string names = fmt::format("{}", fmt::join(d.missing, " or "));
-  const double p = p_of_named(found);
-  const Refit* best = d.missing.empty() ? nullptr : refit_of(found, d.missing[0]);
+  const diagnosis::Unexplained& left = found.unexplained;
   switch (d.verdict) {
     case Verdict::nothing_missing:
       run.say(fmt::format("  nothing missing: {}", d.why));
       break;
     case Verdict::missing:
-      run.say(fmt::format("  missing:  {}   held-out {:.2f} -> {:.2f} mm{}   p {:.3f}   {}", names,
-                          found.figures.held_out_rms_mm, best->held_out_rms_mm, pose_fall(found, *best), p,
-                          values_of(best->parameters)));
+      run.say(fmt::format("  missing:  {}{}", with_probabilities(found),
+                          left.low_mm > found.priors.unexplained_bound_mm
+                              ? fmt::format(", and {:.1f} mm that no effect here explains", left.mean_mm)
+                              : ""));
       break;
     case Verdict::ambiguous:
-      run.say(fmt::format("  missing, cannot be told apart: {}   p {:.3f}", names, p));
+      run.say(fmt::format("  missing, cannot be told apart: {}; {}", with_probabilities(found), d.why));
       break;
     case Verdict::unexplained:
-      run.say(fmt::format("  unexplained: {}{}", d.why, names.empty() ? "" : "; best: " + names));
+      run.say(fmt::format("  unexplained: {}{}", d.why,
+                          d.missing.empty() ? "" : "; best of the catalogue: " + with_probabilities(found)));
       if (found.forces)
         run.say(
             fmt::format("  hint:     forces on the skin that would explain it reach {:.2f} kPa, {:.2f} by chance; "
@@ -239,7 +260,8 @@ void say_limits(const Run& run, const DiagnosisResult& result) {
   std::vector<std::string> blind = diagnosis::not_seen(found);
   blind.insert(blind.end(), found.unseen.begin(), found.unseen.end());
   const auto& set = found.diagnosis.missing;
-  if (found.diagnosis.verdict == Verdict::missing) run.say("  not told apart from it: none");
+  if (found.diagnosis.verdict == Verdict::missing && !found.diagnosis.ambiguous_rest.empty())
+    run.say("  and perhaps: " + joined(found.diagnosis.ambiguous_rest, " or "));
   run.say(fmt::format("  could not be seen with this scan: {}",
                       blind.empty() ? "none" : fmt::format("{}", fmt::join(blind, ", "))));
   if (!result.next.empty()) {
@@ -256,24 +278,25 @@ void say_limits(const Run& run, const DiagnosisResult& result) {
 
 }  // namespace
 
-diagnosis::Subject subject_of(const MeasuredCase& measured, const simulation::Model& model,
+diagnosis::Subject subject_of(const MeasuredCase& measured, const simulation::Model& given,
                               const std::vector<double>& noise_mm) {
-  return {measured.fitted_scene(), measured.whole_scene(), model, noise_mm, nullptr};
+  return {measured.whole_scene(), given, measured.model, noise_mm, nullptr};
 }
 
 DiagnosisResult complete(const MeasuredCase& measured, std::unique_ptr<Findings> found) {
   DiagnosisResult result{std::move(found), {}, {}};
   const Findings& f = *result.found;
   const auto areas = calibration::anatomical_areas(measured.mesh, measured.anatomy);
-  for (std::size_t m = 0; m < measured.fitted.size(); ++m) {
-    const calibration::ModelSkin skin(measured.mesh, f.base.solution.prediction.solution.poses[m].x);
-    const auto error = diagnosis::skin_error(skin, f.base.solution.residuals, f.base.solution.prediction, m);
-    const auto spots = diagnosis::find_hot_spots(skin, error, areas, measured.fitted[m].pose.name);
+  const auto measurements = measured.whole_scene().measurements;
+  for (std::size_t m = 0; m < measurements.size(); ++m) {
+    const calibration::ModelSkin skin(measured.mesh, f.base.fit.prediction.solution.poses[m].x);
+    const auto error = diagnosis::skin_error(skin, f.base.fit.residuals, f.base.fit.prediction, m);
+    const auto spots = diagnosis::find_hot_spots(skin, error, areas, measurements[m]->pose.name);
     result.hot_spots.insert(result.hot_spots.end(), spots.begin(), spots.end());
   }
   std::vector<std::string> set = f.diagnosis.missing;
   if (f.diagnosis.verdict == Verdict::nothing_missing) set.clear();
-  result.next = diagnosis::next_measurements(subject_of(measured, f.model, {}), f, set);
+  result.next = diagnosis::next_measurements(subject_of(measured, measured.model, {}), f, set);
   return result;
 }
 
@@ -283,28 +306,26 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["verdict"] = diagnosis::verdict_name(found.diagnosis.verdict);
   f["missing"] = found.diagnosis.missing;
   f["why"] = found.diagnosis.why;
+  f["ambiguous_rest"] = found.diagnosis.ambiguous_rest;
+  f["hypotheses"] = hypotheses_json(found);
+  f["included"] = included_json(found);
+  f["unexplained_mm"] = found.unexplained.mean_mm;
+  f["unexplained95"] = {found.unexplained.low_mm, found.unexplained.high_mm};
+  f["unexplained_bound_mm"] = found.priors.unexplained_bound_mm;
+  f["registration"] = registration_json(found);
   f["candidates"] = Json::array();
-  for (const Refit& refit : found.refits)  // refitted ones first, best first
+  for (const diagnosis::Inclusion& one : found.included)  // most probable first
     for (const Score& score : found.table.scores)
-      if (score.effect == refit.effect) f["candidates"].push_back(candidate_json(found, score));
-  for (const Score& score : found.table.scores)
-    if (std::none_of(found.refits.begin(), found.refits.end(),
-                     [&score](const Refit& r) { return r.effect == score.effect; }))
-      f["candidates"].push_back(candidate_json(found, score));
-  f["base_mae_mm"] = found.base.solution.residuals.distance_mm.cwiseAbs().mean();
-  f["base_rms_mm"] = found.figures.rms_mm;
-  f["base_held_out_rms_mm"] = found.figures.held_out_rms_mm;
-  f["base_held_out_pose_rms_mm"] = number_or_null(found.figures.pose_rms_mm);
-  f["base_pose_misfit"] =
-      found.others.unfitted > 0 && !found.sources.unfitted_mean_mm.empty() ? Json(found.others.misfit) : Json(nullptr);
-  f["other_poses_corrected"] = !found.sources.unfitted_mean_mm.empty();
+      if (score.effect == one.effect) f["candidates"].push_back(candidate_json(found, score));
+  f["base_mae_mm"] = found.base.fit.residuals.distance_mm.cwiseAbs().mean();
+  f["base_rms_mm"] = found.rms_mm;
+  f["base_held_out_rms_mm"] = found.held_out_rms_mm;
   f["base_parameters"] = Json::object();
-  const calibration::FreeParameters parameters(found.model);
+  const calibration::FreeParameters& parameters = *found.base.parameters;
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
     f["base_parameters"][parameters.names()[static_cast<std::size_t>(i)]] =
-        parameters.value(i, found.base.solution.u[i]);
-  f["left_before"] = left_json(found.figures.left);
-  f["left_after"] = left_json(found.diagnosis.left);
+        parameters.value(i, found.base.fit.u[i]);
+  f["nuisances_sigma"] = nuisances_json(found);
   f["budget_mm"] = budget_json(found.budget);
   f["hot_spots"] = Json::array();
   for (const auto& spot : result.hot_spots)
@@ -326,8 +347,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
                                      {"shows", next.shows}});
   f["alike"] = alike_json(found.table);
   f["missing_force"] = forces_json(found);
-  f["effective_points"] = found.table.effective_points;
-  f["noise_mm"] = found.figures.noise_mm;
+  f["noise_mm"] = found.budget.noise;
   f["numerical"] = numerical_json(found);
   return f;
 }
@@ -335,13 +355,12 @@ Json diagnosis_figures(const DiagnosisResult& result) {
 void say_diagnosis(const Run& run, const DiagnosisResult& result) {
   const Findings& found = *result.found;
   const auto& b = found.budget;
-  say_scores(run, found);
-  say_refits(run, found);
-  run.say(
-      fmt::format("  residual: MAE {:.2f} mm, RMS {:.2f}, held-out {:.2f}; scan noise {:.2f}, registration {:.2f}, "
-                  "numerical {:.2f}, parameters {:.2f}, model {:.2f}",
-                  found.base.solution.residuals.distance_mm.cwiseAbs().mean(), b.total, found.figures.held_out_rms_mm,
-                  b.noise, b.registration, b.numerical, b.parameters, b.model_form));
+  say_places(run, found);
+  say_hypotheses(run, found);
+  run.say(fmt::format("  residual: MAE {:.2f} mm, RMS {:.2f}, held-out {:.2f}; scan noise {:.2f}, registration {:.2f}, "
+                      "numerical {:.2f}, parameters {:.2f}, patchiness {:.2f}, unexplained {:.2f}",
+                      found.base.fit.residuals.distance_mm.cwiseAbs().mean(), b.total, found.held_out_rms_mm, b.noise,
+                      b.registration, b.numerical, b.parameters, b.patchiness, b.model_form));
   run.say("  where:    " + where(result.hot_spots));
   say_verdict(run, found);
   say_limits(run, result);
@@ -353,19 +372,20 @@ void write_diagnosis_files(Run& run, const MeasuredCase& measured, const Diagnos
   std::vector<std::pair<std::string, Eigen::VectorXd>> shapes;
   for (const Score& score : found.table.scores) {
     const auto& candidate = candidate_of(found, score.effect);
-    Eigen::VectorXd shape = Eigen::VectorXd::Zero(found.base.solution.residuals.size());
+    Eigen::VectorXd shape = Eigen::VectorXd::Zero(found.base.fit.residuals.size());
     for (Eigen::Index k = 0; k < score.step.size(); ++k)
       shape += (score.step[k] - candidate.parameters[static_cast<std::size_t>(k)].null) * candidate.slope.col(k);
     shapes.emplace_back(score.effect, shape);
   }
   std::vector<std::string> poses;
-  for (const auto& m : measured.fitted) poses.push_back(m.pose.name);
-  diagnosis::write_diagnosis(found.base.solution.residuals, poses, shapes, found.forces ? &*found.forces : nullptr,
+  for (const auto* m : measured.whole_scene().measurements) poses.push_back(m->pose.name);
+  diagnosis::write_diagnosis(found.base.fit.residuals, poses, shapes, found.forces ? &*found.forces : nullptr,
                              run.output(folder / "diagnosis.vtp"));
   const auto areas = calibration::anatomical_areas(measured.mesh, measured.anatomy);
-  for (std::size_t m = 0; m < measured.fitted.size(); ++m) {
-    const calibration::ModelSkin skin(measured.mesh, found.base.solution.prediction.solution.poses[m].x);
-    const auto error = diagnosis::skin_error(skin, found.base.solution.residuals, found.base.solution.prediction, m);
+  const auto measurements = measured.whole_scene().measurements;
+  for (std::size_t m = 0; m < measurements.size(); ++m) {
+    const calibration::ModelSkin skin(measured.mesh, found.base.fit.prediction.solution.poses[m].x);
+    const auto error = diagnosis::skin_error(skin, found.base.fit.residuals, found.base.fit.prediction, m);
     const fs::path file = folder / fmt::format("error_map_{}.vtp", poses[m]);
     diagnosis::write_error_map(skin, error, areas, run.output(file));
   }

@@ -18,7 +18,8 @@ struct DiagnosisResult {
   std::vector<diagnosis::Separation> next;
 };
 
-diagnosis::Subject subject_of(const MeasuredCase& measured, const simulation::Model& model,
+/// @param given  the base model: where priors stand
+diagnosis::Subject subject_of(const MeasuredCase& measured, const simulation::Model& given,
                               const std::vector<double>& noise_mm);
 
 /// Hot spots and next measurements of findings.

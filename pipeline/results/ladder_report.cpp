@@ -17,19 +17,20 @@ using diagnosis::RungFigures;
 using Json = nlohmann::ordered_json;
 
 Json figures_json(const RungFigures& r) {
-  const auto& poses = r.held_out_pose_rms_mm;
   return {{"added", r.added},
           {"mae_mm", r.mae_mm},
           {"rms_mm", r.rms_mm},
-          {"held_out_rms_mm", r.held_out_rms_mm},
-          {"held_out_pose_rms_mm", poses.empty() ? Json(nullptr) : Json(poses)}};
+          {"held_out_rms_mm", r.held_out_rms_mm}};
 }
 
 Json or_null(const std::optional<RungFigures>& figures) { return figures ? figures_json(*figures) : Json(nullptr); }
 
 Json rung_json(const diagnosis::Rung& rung) {
   Json json = figures_json(rung);
+  json["probability"] = rung.probability;
   json["p_value"] = rung.p_value;
+  json["unexplained_mm"] = rung.left.mean_mm;
+  json["unexplained95"] = {rung.left.low_mm, rung.left.high_mm};
   if (!rung.added.empty())
     json["controls"] = {{"refit_only", or_null(rung.refit_only)}, {"random_other", or_null(rung.random_other)}};
   return json;
@@ -66,16 +67,18 @@ Json ladder_figures(const diagnosis::Ladder& ladder) {
 }
 
 void say_ladder(const Run& run, const diagnosis::Ladder& ladder) {
-  const auto line = [&run](const std::string& name, const RungFigures& r) {
-    run.say(fmt::format("  {:<34}{:>8.3f}{:>8.3f}{:>10.3f}{:>10}", name, r.mae_mm, r.rms_mm, r.held_out_rms_mm,
-                        r.held_out_pose_rms_mm.empty() ? "-" : fmt::format("{:.3f}", r.held_out_pose_rms_mm[0])));
+  const auto line = [&run](const std::string& name, const RungFigures& r, const std::string& left) {
+    run.say(fmt::format("  {:<34}{:>8.3f}{:>8.3f}{:>10.3f}{}", name, r.mae_mm, r.rms_mm, r.held_out_rms_mm, left));
   };
-  run.say(fmt::format("  {:<34}{:>8}{:>8}{:>10}{:>10}", "ladder, mm", "MAE", "RMS", "held out", "pose"));
-  line("refit only", ladder.rungs.front());
+  const auto left_by = [](const diagnosis::Rung& rung) {
+    return fmt::format("{:>14.2f} [{:.2f}, {:.2f}]", rung.left.mean_mm, rung.left.low_mm, rung.left.high_mm);
+  };
+  run.say(fmt::format("  {:<34}{:>8}{:>8}{:>10}{:>14}", "ladder, mm", "MAE", "RMS", "held out", "unexplained"));
+  line("refit only", ladder.rungs.front(), left_by(ladder.rungs.front()));
   for (std::size_t r = 1; r < ladder.rungs.size(); ++r) {
     const diagnosis::Rung& rung = ladder.rungs[r];
-    if (rung.random_other) line("control: + " + rung.random_other->added, *rung.random_other);
-    line("+ " + rung.added, rung);
+    if (rung.random_other) line("control: + " + rung.random_other->added, *rung.random_other, "");
+    line("+ " + rung.added, rung, left_by(rung));
   }
   run.say(fmt::format("  noise and mesh alone would leave {:.2f}; stopped: {}", ladder.noise_floor_mm, ladder.stopped));
 }

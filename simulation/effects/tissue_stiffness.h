@@ -14,11 +14,17 @@ class TissueStiffness : public Effect {
     return std::string(segmentation::tissue_names[static_cast<int>(tissue_)]) + "_stiffness";
   }
   std::string meaning() const override;
+  EffectTraits traits() const override { return {.error_source = is_gland() ? "gland" : ""}; }
+  double tolerance(const std::string&, const MeasurementTolerances& known) const override {
+    return is_gland() ? known.gland_log : 0;
+  }
   const std::vector<Parameter>& parameters() const override { return rows_; }
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 
  private:
+  bool is_gland() const { return tissue_ == segmentation::Tissue::gland; }
+
   segmentation::Tissue tissue_;
   std::vector<Parameter> rows_;
 };

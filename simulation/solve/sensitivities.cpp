@@ -92,12 +92,37 @@ struct Sensitivities::State {
 
   /// ∂r/∂p of a pose with x and X held, and what moving the known shape does to its mass.
   Flat force_derivative(std::size_t pose, const std::string& parameter, Points* prone_derivative) {
-    const Fields<Dual> fields = chain.fields(model, chain.poses()[pose], parameter);
+    return force_derivative(pose, chain.fields(model, chain.poses()[pose], parameter), prone_derivative);
+  }
+
+  Flat force_derivative(std::size_t pose, const FieldDirection& direction, Points* prone_derivative) {
+    Fields<Dual> fields = chain.fields(model, chain.poses()[pose]);
+    direction(chain.poses()[pose], fields);
+    return force_derivative(pose, fields, prone_derivative);
+  }
+
+  Flat force_derivative(std::size_t pose, const Fields<Dual>& fields, Points* prone_derivative) {
     chain.mechanics_.set_fields(values_of(fields));
     const Points imaged = shaped(derivatives_of(fields).imaged_offset);
     chain.mechanics().parameter_derivative(at(pose), fields, sums);
     if (prone_derivative != nullptr) *prone_derivative = imaged;
     return sums.residual;
+  }
+
+  /// @param what  a parameter or a direction of the fields
+  template <class What>
+  ChainDerivative derivative(const What& what) {
+    ChainDerivative result;
+    Flat force = force_derivative(0, what, &result.prone);
+    const Flat prone = flat(result.prone);
+    if (!prone.isZero(0)) force += prone_tangent * prone;
+    const Flat undeformed = -(*inverse)->solve(force);
+    result.X = shaped(undeformed);
+    for (std::size_t p = 1; p < chain.poses().size(); ++p) {
+      const Flat pull = force_derivative(p, what, nullptr) + reference_tangents[p - 1] * undeformed;
+      result.poses.push_back(shaped(-tangents[p - 1]->solve(pull)));
+    }
+    return result;
   }
 };
 
@@ -118,19 +143,12 @@ Sensitivities::Sensitivities(Chain& chain, const Model& model, const ChainSoluti
 
 Sensitivities::~Sensitivities() = default;
 
-ChainDerivative Sensitivities::of(const std::string& parameter) const {
-  State& s = *state_;
-  ChainDerivative result;
-  Flat force = s.force_derivative(0, parameter, &result.prone);
-  const Flat prone = flat(result.prone);
-  if (!prone.isZero(0)) force += s.prone_tangent * prone;
-  const Flat undeformed = -(*s.inverse)->solve(force);
-  result.X = shaped(undeformed);
-  for (std::size_t p = 1; p < s.chain.poses().size(); ++p) {
-    const Flat pull = s.force_derivative(p, parameter, nullptr) + s.reference_tangents[p - 1] * undeformed;
-    result.poses.push_back(shaped(-s.tangents[p - 1]->solve(pull)));
-  }
-  return result;
+ChainDerivative Sensitivities::of(const std::string& parameter) const { return state_->derivative(parameter); }
+
+ChainDerivative Sensitivities::along(const FieldDirection& direction) const { return state_->derivative(direction); }
+
+Points Sensitivities::moved_by(std::size_t pose, const Eigen::VectorXd& force) const {
+  return shaped(state_->tangents.at(pose)->solve(force));
 }
 
 Eigen::VectorXd Sensitivities::gradient(const std::vector<Points>& by_pose,

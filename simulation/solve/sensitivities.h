@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -32,6 +33,17 @@ class Sensitivities {
   /// @param parameter  as in parameters.h, for example "ligament.stiffness_kpa_per_mm"
   /// @throws InputError  no such parameter
   ChainDerivative of(const std::string& parameter) const;
+
+  /// How the fields of one pose change along a direction: sets their derivatives (Dual::v), which come as zeros.
+  using FieldDirection = std::function<void(const PoseLoad& pose, Fields<Dual>& fields)>;
+  /// The same as of(), along any change of the fields.
+  ChainDerivative along(const FieldDirection& direction) const;
+
+  /// What forces on the nodes move in one pose, the undeformed shape held: K_s dx_s = force.
+  /// @param pose   in the order of ChainSolution::poses
+  /// @param force  3 per node, mN
+  /// @return #N by 3, mm
+  Points moved_by(std::size_t pose, const Eigen::VectorXd& force) const;
 
   /// Gradient of a scalar J(x of every pose) by the adjoint method: two back-substitutions in all, whatever the number
   /// of parameters.

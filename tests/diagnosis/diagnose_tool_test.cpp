@@ -40,7 +40,7 @@ TEST_F(DiagnoseTool, TellsEveryStepItBegins) {
   const Finished finished = diagnose({});
   ASSERT_EQ(finished.code, 0) << finished.err;
   std::size_t before = 0;
-  for (const char* step : {"sensitivities", "two other meshes", "fit under all errors", "catalogue", "scores"}) {
+  for (const char* step : {"errors of mesh and body", "fit with all that is never known", "catalogue", "evidence"}) {
     const std::size_t at = finished.out.find(std::string("\n  ") + step + "\n");
     ASSERT_NE(at, std::string::npos) << step << " is not in:\n" << finished.out;
     EXPECT_GT(at, before) << step;
@@ -48,13 +48,13 @@ TEST_F(DiagnoseTool, TellsEveryStepItBegins) {
   }
 }
 
-TEST_F(DiagnoseTool, WarnsWhereTheErrorOfTheMeshIsGuessed) {
+TEST_F(DiagnoseTool, WarnsWhereTheMeshIsTakenToBeExact) {
   const Finished finished = diagnose({"--no-other-meshes"});
   ASSERT_EQ(finished.code, 0) << finished.err;
-  EXPECT_NE(finished.err.find("the error of the mesh is guessed from the residual (not asked for)"), std::string::npos)
+  EXPECT_NE(finished.err.find("the mesh is taken to be exact (not asked for)"), std::string::npos)
       << finished.err;
   const Json json = Json::parse(std::ifstream(found_ / "diagnosis.json"));
-  EXPECT_NE(json["warnings"].dump().find("guessed from the residual"), std::string::npos) << json["warnings"];
+  EXPECT_NE(json["warnings"].dump().find("taken to be exact"), std::string::npos) << json["warnings"];
 }
 
 }  // namespace

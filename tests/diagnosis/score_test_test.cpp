@@ -8,7 +8,6 @@
 
 #include "common/error.h"
 #include "common/statistics.h"
-#include "diagnosis/examine.h"
 #include "tests/diagnosis/sheet.h"
 
 namespace supine::diagnosis {
@@ -185,26 +184,6 @@ TEST(ScoreTest, ChiSquaredTailsAreThoseOfTheTables) {
   EXPECT_EQ(chi_squared_above(5, 0), 1);
 }
 
-TEST(Whitening, CorrelatedErrorsBecomeIndependent) {
-  const Residuals r = sheet(6, 300);
-  const calibration::ErrorModel errors{0.4, 0.9, 25};
-  const Whitening whitening = Whitening::correlated(r, errors);
-  const calibration::Clusters& clusters = whitening.clusters();
-  const Eigen::Index n = clusters.members.size();
-  ASSERT_LE(n, 300);
-  EXPECT_EQ(clusters.members.sum(), 300);
-  Eigen::MatrixXd sigma(n, n);  // of the cluster means
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j)
-      sigma(i, j) = 0.81 * std::exp(-(clusters.place.row(i) - clusters.place.row(j)).norm() / 25) +
-                    (i == j ? 0.16 / clusters.members[i] : 0);
-  // Columns over the points whose cluster means are those of Σ.
-  Eigen::MatrixXd by_point(300, n);
-  for (int i = 0; i < 300; ++i) by_point.row(i) = sigma.row(clusters.of_point[i]);
-  const Eigen::MatrixXd half = whitening.apply(by_point);  // L⁻¹ Σ = Lᵀ
-  EXPECT_LT((half.transpose() * half - sigma).norm(), 1e-9 * sigma.norm());
-}
-
 TEST(ScoreTest, WhatTheMeshTakesAwayIsTestedAndPredictedErrorsAreThoseOfTheDistancesAsTheyAre) {
   const Residuals r = sheet(1);
   const auto candidates = catalogue_of(r);
@@ -230,49 +209,6 @@ TEST(ScoreTest, OfTheWrongSignIsNotCalledImplausiblyLargeAsWell) {
       score_of(score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1), "ring");
   EXPECT_TRUE(ring.wrong_sign);
   EXPECT_FALSE(ring.beyond_range);
-}
-
-TEST(ScoreTest, AScoreWithoutItsOwnToleranceIsThatUnderErrorsWithoutIt) {
-  Residuals r = sheet(1);
-  const auto candidates = catalogue_of(r);
-  const Eigen::VectorXd shape = candidates[2].slope.col(0);
-  r.distance_mm -= shape;
-  constexpr double tolerance = 0.4;
-  ErrorSources sources;
-  sources.noise_mm = r.sigma_mm, sources.mean_mm = no_mean(r);
-  sources.spread_mm = 0.2, sources.share = Eigen::VectorXd::Ones(r.size()), sources.length_mm = 15;
-  const auto score_under = [&](const ErrorSources& errors) {
-    return score_of(score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::of(r, errors), 1), "ring");
-  };
-  const Score without = score_under(sources);
-  sources.modes.push_back({"chest_wall", tolerance * shape});
-  const Score with = score_under(sources);
-  EXPECT_LT(with.statistic, 0.5 * without.statistic);
-  EXPECT_NEAR(statistic_without(with, tolerance), without.statistic, 1e-6 * without.statistic);
-  EXPECT_DOUBLE_EQ(statistic_without(with, 0), with.statistic);
-  EXPECT_DOUBLE_EQ(statistic_without(with, 10), 10 * with.statistic) << "no more than that";
-  Score pair = with;
-  pair.step = pair.step_sd = Eigen::Vector2d::Ones();
-  EXPECT_DOUBLE_EQ(statistic_without(pair, tolerance), with.statistic) << "several parameters";
-}
-
-Score scored(const std::string& effect, double step, double sd) {
-  Score score{};
-  score.effect = effect, score.freedom = 1;
-  score.step = Eigen::VectorXd::Constant(1, step), score.step_sd = Eigen::VectorXd::Constant(1, sd);
-  score.statistic = score.slope_statistic = step * step / (sd * sd);
-  return score;
-}
-
-TEST(WorthRefitting, WhatIsHiddenByItsOwnToleranceComesFirst) {
-  ScoreTable table{};
-  table.scores = {scored("gravity_tilt", 0.8, 0.1), scored("friction", 0.7, 0.1),
-                  scored("chest_wall_motion", 3.1, 1.04)};  // T 64, 49, 9; the last 118 without 1 mm of tolerance
-  using Names = std::vector<std::string>;
-  EXPECT_EQ(worth_refitting(table, {}, 1, 2), (Names{"chest_wall_motion", "gravity_tilt"}));
-  EXPECT_EQ(worth_refitting(table, {}, 1, 6), (Names{"chest_wall_motion", "gravity_tilt", "friction"}));
-  table.scores.back() = scored("chest_wall_motion", 2, 1.04);
-  EXPECT_EQ(worth_refitting(table, {}, 1, 6), (Names{"gravity_tilt", "friction"})) << "errors of the usual size";
 }
 
 }  // namespace

@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/evidence/base_fit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calibration/noise.h"
+#include "common/error.h"
+#include "diagnosis/evidence/discrepancy.h"
+#include "diagnosis/evidence/field_modes.h"
+#include "diagnosis/weighted_fit.h"
+#include "simulation/parameters.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::Evaluator;
+using calibration::FreeParameters;
+using calibration::Residuals;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index most_clusters = 600;
+constexpr int most_steps = 6;
+constexpr double settled = 0.3;       // of F: a further step gains no more
+constexpr double longest_step = 1.0;  // of a coordinate of a modulus: e
+constexpr int most_halvings = 4;
+constexpr int most_rounds = 3;
+constexpr double far = 0.2;  // of a coordinate: errors measured there are not those of the body any more
+
+/// The scanner's noise, what is white of it and what neighbours share.
+struct ScanNoise {
+  VectorXd white_mm, shared_mm;
+};
+
+/// White is what neighbouring points show, where there are enough of them. Where that is less than the case says, the
+/// rest is taken to be shared.
+ScanNoise noise_of(const Residuals& residuals, double shared_mm) {
+  constexpr int fewest = 200;
+  ScanNoise noise{residuals.sigma_mm, VectorXd::Constant(residuals.size(), shared_mm)};
+  for (int pose = 0; pose <= residuals.pose.maxCoeff(); ++pose) {
+    std::vector<int> rows;
+    for (Index r = 0; r < residuals.size(); ++r)
+      if (residuals.pose[r] == pose) rows.push_back(static_cast<int>(r));
+    if (rows.size() < fewest) continue;
+    const double seen = calibration::estimate_noise_mm(residuals.place(rows, Eigen::all), residuals.distance_mm(rows));
+    for (const int r : rows) {
+      const double given = residuals.sigma_mm[r];
+      noise.white_mm[r] = seen;
+      noise.shared_mm[r] = std::max(shared_mm, std::sqrt(std::max(0.0, given * given - seen * seen)));
+    }
+  }
+  return noise;
+}
+
+/// What scanners err together, and what the mesh does beyond what is taken away.
+void add_shared(const BaseFit& base, const Priors& priors, const VectorXd& shared_mm, MatrixXd& errors) {
+  const calibration::Clusters& c = base.clusters;
+  const MatrixXd scan = gaussian_kernel(c.place, c.place, priors.scan_shared_length_mm);
+  VectorXd spread = VectorXd::Zero(c.pose.size());
+  if (base.numerical) spread = base.numerical->spread_mm * c.means(base.numerical->share);
+  for (Index i = 0; i < errors.rows(); ++i)
+    for (Index j = 0; j < errors.cols(); ++j) {
+      if (c.pose[i] != c.pose[j]) continue;
+      errors(i, j) += shared_mm[i] * shared_mm[j] * scan(i, j);
+      if (base.numerical)
+        errors(i, j) += spread[i] * spread[j] *
+                        std::exp(-(c.place.row(i) - c.place.row(j)).norm() / base.numerical->length_mm);
+    }
+}
+
+double way_mm(const calibration::Prediction& prediction) {
+  const Points way = prediction.solution.poses[0].x - prediction.solution.prone;
+  return std::sqrt(way.squaredNorm() / static_cast<double>(way.rows()));
+}
+
+void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitivities, const Priors& priors,
+                 BaseFit& base) {
+  const Residuals& residuals = base.fit.residuals;
+  const ScanNoise noise = noise_of(residuals, priors.scan_shared_mm);
+  base.noise_of_point_mm = noise.white_mm;
+  const VectorXd variance = base.clusters.means(base.noise_of_point_mm.cwiseAbs2());
+  base.errors = variance.cwiseQuotient(base.clusters.members).asDiagonal();
+  add_shared(base, priors, base.clusters.means(noise.shared_mm), base.errors);
+  const MatrixXd patches = base.clusters.means(
+      patchiness_shapes(evaluator.chain(), sensitivities, base.fit.prediction, residuals, priors.patchiness));
+  base.errors += patches * patches.transpose();
+  base.patchiness_mm = std::sqrt(patches.squaredNorm() / static_cast<double>(patches.rows()));
+  base.mean_mm = VectorXd::Zero(residuals.size());
+  if (base.numerical) {
+    base.mean_mm = base.numerical->finer_mm;
+    const VectorXd doubt = base.numerical->finer_doubt * base.clusters.means(base.numerical->finer_mm);
+    const VectorXd coarser = base.clusters.means(base.numerical->coarser_mm);
+    base.errors += doubt * doubt.transpose() + coarser * coarser.transpose();
+  }
+  base.kernel = discrepancy_kernel(*evaluator.scene().mesh, sensitivities, base.fit.prediction, residuals,
+                                   base.clusters);
+  base.scale_mm = std::max(priors.least_unexplained_mm, priors.share_of_way * way_mm(base.fit.prediction));
+  base.most_mm = priors.most_unexplained_mm;
+  base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);
+}
+
+/// Where a step would lead.
+struct Trial {
+  VectorXd u;
+  std::vector<Nuisance> nuisances;
+};
+
+Trial stepped(const BaseFit& base, const VectorXd& step) {
+  const Index moduli = base.fit.u.size();
+  Trial trial{base.parameters->clamped(base.fit.u + step.head(moduli)), base.nuisances};
+  for (Index k = moduli; k < step.size(); ++k) trial.nuisances[static_cast<std::size_t>(k - moduli)].value += step[k];
+  return trial;
+}
+
+double objective(const BaseFit& base, const VectorXd& y, const Trial& at) {
+  double sum = base.covariance->square(y, base.size_mm) + base.parameters->prior_deviation(at.u).squaredNorm();
+  for (const Nuisance& nuisance : at.nuisances) sum += nuisance.value * nuisance.value;
+  return sum;
+}
+
+class Fitter {
+ public:
+  Fitter(Evaluator& evaluator, BaseFit& base) : evaluator_(evaluator), base_(base) {
+    poses_.push_back(evaluator.scene().prone.name);
+    for (const auto* measurement : evaluator.scene().measurements) poses_.push_back(measurement->pose.name);
+  }
+
+  const std::vector<std::string>& poses() const { return poses_; }
+
+  void predict(const Trial& at, const simulation::ChainSolution* near) {
+    base_.model = with_nuisances(base_.parameters->model(at.u), at.nuisances, poses_);
+    base_.fit.u = at.u;
+    base_.fit.prediction = evaluator_.predict(base_.model, near);
+    base_.nuisances = at.nuisances;
+    if (base_.fit.mask.empty()) base_.fit.mask = calibration::points_over_skin(base_.fit.prediction);
+    base_.fit.residuals =
+        calibration::residuals_of(evaluator_.scene(), base_.fit.prediction, base_.fit.mask, base_.noise_mm);
+    ++base_.evaluations;
+  }
+
+  /// Slopes of moduli and nuisances at the prediction.
+  std::unique_ptr<simulation::Sensitivities> linearise() {
+    auto sensitivities =
+        std::make_unique<simulation::Sensitivities>(evaluator_.chain(), base_.model, base_.fit.prediction.solution);
+    const Residuals& residuals = base_.fit.residuals;
+    MatrixXd& slope = base_.fit.linearisation.slope;
+    const VectorXd unit = base_.parameters->slope(base_.fit.u);
+    slope.resize(residuals.size(), unit.size());
+    base_.fit.linearisation.by_coordinate.clear();
+    for (Index i = 0; i < unit.size(); ++i) {
+      const std::string& name = base_.parameters->names()[static_cast<std::size_t>(i)];
+      simulation::ChainDerivative derivative = sensitivities->of(name);
+      slope.col(i) = unit[i] * slope_at(evaluator_, base_.model, base_.fit.prediction, residuals, name, derivative);
+      derivative.X *= unit[i], derivative.prone *= unit[i];
+      for (Points& x : derivative.poses) x *= unit[i];
+      base_.fit.linearisation.by_coordinate.push_back(std::move(derivative));
+    }
+    find_shapes(evaluator_, *sensitivities, base_.model, base_.fit.prediction, residuals, base_.nuisances);
+    return sensitivities;
+  }
+
+  /// One step of Gauss and Newton, shortened until F falls. @return  whether it did by more than a little
+  bool improve() {
+    const LinearEvidence evidence(*base_.covariance, base_.distances(base_.fit.residuals), base_directions(base_));
+    std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
+    for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<int>(k);
+    const Weighed weighed = evidence.weigh(all);
+    Index likeliest;
+    weighed.size_probability.maxCoeff(&likeliest);
+    base_.size_mm = base_.size_of(weighed);
+    VectorXd step = weighed.mean[static_cast<std::size_t>(likeliest)];
+    const double moduli = step.head(base_.fit.u.size()).cwiseAbs().maxCoeff();
+    if (moduli > longest_step) step *= longest_step / moduli;
+    const Trial now{base_.fit.u, base_.nuisances};
+    const double before = objective(base_, base_.distances(base_.fit.residuals), now);
+    const VectorXd y = base_.distances(base_.fit.residuals);
+    const Trial wanted = stepped(base_, step);
+    const double promised = before - objective(base_, y + evidence.directions().columns * step, wanted);
+    if (promised < settled) return false;
+    const calibration::Fit kept = base_.fit;
+    const simulation::Model kept_model = base_.model;
+    for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
+      base_.fit.u = kept.u, base_.nuisances = now.nuisances;
+      const Trial trial = stepped(base_, step);
+      const simulation::ChainSolution near = calibration::extrapolated(
+          kept.prediction.solution, kept.linearisation.by_coordinate, trial.u - kept.u);
+      try {
+        predict(trial, &near);
+        if (objective(base_, base_.distances(base_.fit.residuals), trial) < before) return true;
+      } catch (const NumericalFailure&) {
+        // No equilibrium there: a shorter step.
+      }
+    }
+    base_.fit = kept, base_.model = kept_model, base_.nuisances = now.nuisances;
+    return false;
+  }
+
+ private:
+  Evaluator& evaluator_;
+  BaseFit& base_;
+  std::vector<std::string> poses_;
+};
+
+void measure_mesh(Evaluator& evaluator, BaseFit& base) {
+  const std::optional<NumericalError> before = std::move(base.numerical);
+  base.numerical.reset();
+  base.numerical_failure.clear();
+  try {
+    base.numerical = measure_numerical_error(evaluator.scene(), base.model, base.fit, before ? &*before : nullptr);
+  } catch (const NumericalFailure& failure) {
+    base.numerical_failure = failure.what();
+  }
+}
+
+VectorXd coordinates_of(const FreeParameters& parameters, const simulation::Model& start) {
+  VectorXd u = parameters.start();
+  simulation::Model from = start;
+  for (Index i = 0; i < u.size(); ++i)
+    if (const auto* setting = simulation::find_setting(from, parameters.names()[static_cast<std::size_t>(i)]))
+      u[i] = parameters.coordinate(i, setting->value);
+  return parameters.clamped(u);
+}
+
+}  // namespace
+
+Directions base_directions(const BaseFit& base) {
+  Directions all;
+  const MatrixXd slopes = base.clusters.means(base.fit.linearisation.slope);
+  for (Index i = 0; i < slopes.cols(); ++i) {
+    constexpr double open = 3;  // coordinates: nothing is believed of it
+    const auto& prior = base.parameters->priors()[static_cast<std::size_t>(i)];
+    all.add(base.parameters->names()[static_cast<std::size_t>(i)], slopes.col(i), prior ? prior->mean - base.fit.u[i] : 0, prior ? prior->sd : open);
+  }
+  for (const Nuisance& nuisance : base.nuisances)
+    all.add(nuisance.name(), base.clusters.means(nuisance.shape_mm), -nuisance.value, 1, nuisance.value * nuisance.sigma,
+            nuisance.sigma);
+  return all;
+}
+
+VectorXd BaseFit::distances(const Residuals& residuals) const {
+  return clusters.means(residuals.distance_mm + mean_mm);
+}
+
+double BaseFit::size_of(const Weighed& weighed) const {
+  Index likeliest;
+  weighed.size_probability.maxCoeff(&likeliest);
+  return covariance->sizes_mm()[likeliest];
+}
+
+BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, const simulation::Model& start,
+                       const std::vector<double>& noise_mm, const simulation::ChainSolution* near,
+                       const BaseFitOptions& options) {
+  const auto tell = [&options](const std::string& what) {
+    if (options.progress) options.progress(what);
+  };
+  BaseFit base;
+  base.noise_mm = noise_mm;
+  base.parameters.emplace(given);
+  Fitter fitter(evaluator, base);
+  base.nuisances = nuisances_of(given, fitter.poses(), options.priors.known);
+  fitter.predict({coordinates_of(*base.parameters, start), base.nuisances}, near);
+  base.clusters = calibration::cluster_points(base.fit.residuals, most_clusters);
+  for (int round = 0; round < most_rounds; ++round) {
+    const VectorXd measured_at = base.fit.u;
+    tell("errors of mesh and body");
+    if (options.other_meshes)
+      measure_mesh(evaluator, base);
+    else
+      base.numerical_failure = "not asked for";
+    find_errors(evaluator, *fitter.linearise(), options.priors, base);
+    for (int step = 0; step < most_steps; ++step) {
+      tell("fit with all that is never known");
+      if (!fitter.improve()) break;
+      fitter.linearise();
+    }
+    if ((base.fit.u - measured_at).cwiseAbs().maxCoeff() < far) break;
+  }
+  return base;
+}
+
+}  // namespace supine::diagnosis

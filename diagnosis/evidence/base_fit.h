@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/error_model.h"
+#include "calibration/least_squares.h"
+#include "diagnosis/evidence/linear_evidence.h"
+#include "diagnosis/evidence/nuisances.h"
+#include "diagnosis/evidence/priors.h"
+#include "diagnosis/numerical_error.h"
+
+namespace supine::diagnosis {
+
+/// A model that lacks nothing, fitted together with all that is never known, and what is needed to weigh others
+/// against it. Clusters of points, errors and discrepancy are fixed here, once, for every hypothesis.
+struct BaseFit {
+  std::optional<calibration::FreeParameters> parameters;  ///< of the model as given: where its priors stand
+  simulation::Model model;                                ///< at the optimum, nuisances at their values
+  calibration::Fit fit;                                   ///< of it
+  std::vector<Nuisance> nuisances;                        ///< at the optimum
+  std::vector<double> noise_mm;                           ///< per measurement, as given
+  calibration::Clusters clusters;
+  Eigen::VectorXd noise_of_point_mm;            ///< #R, of the scanner
+  double patchiness_mm = 0;                     ///< rms that uneven tissue, skin and muscle make
+  Eigen::VectorXd mean_mm;                      ///< #R, added to the distances: what the mesh takes away
+  Eigen::MatrixXd errors;                       ///< R over the clusters, without nuisances
+  Eigen::MatrixXd kernel;                       ///< K over the clusters
+  std::unique_ptr<ErrorCovariance> covariance;  ///< of both
+  double scale_mm = 0, most_mm = 0;             ///< of the prior of the discrepancy's size
+  double size_mm = 0;                           ///< s of the discrepancy that is likeliest
+  std::optional<NumericalError> numerical;
+  std::string numerical_failure;
+  int evaluations = 0;
+
+  /// Distances over the clusters, the mesh's error taken away.
+  Eigen::VectorXd distances(const calibration::Residuals& residuals) const;
+  /// The likeliest size of the discrepancy in a hypothesis.
+  double size_of(const Weighed& weighed) const;
+};
+
+/// What distances depend on in every hypothesis, moduli first, then nuisances, as offsets from where they stand.
+Directions base_directions(const BaseFit& base);
+
+struct BaseFitOptions {
+  Priors priors;
+  bool other_meshes = true;                                 ///< measure the mesh's error
+  std::function<void(const std::string&)> progress;         ///< may be empty
+};
+
+/// Gauss–Newton in the moduli and the nuisances, from the model's values: distances are exact at every step, uneven
+/// tissue, skin and muscle (patchiness.h) and the discrepancy are linear and taken at the first.
+/// @param start  values of the free parameters to begin with, by name; the prior's where there is none
+/// @throws NumericalFailure  no equilibrium at the start
+BaseFit fit_base_model(calibration::Evaluator& evaluator, const simulation::Model& given,
+                       const simulation::Model& start, const std::vector<double>& noise_mm,
+                       const simulation::ChainSolution* near, const BaseFitOptions& options);
+
+}  // namespace supine::diagnosis

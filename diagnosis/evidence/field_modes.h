@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/arrays.h"
+
+namespace supine::diagnosis {
+
+/// Rows that lie as far from each other as they can, from the first on; at most @p most, fewer where points coincide.
+std::vector<int> spread_out(const Points& points, int most);
+
+/// exp(−|a − b|² / (2 length²)), #a by #b.
+Eigen::MatrixXd gaussian_kernel(const Points& a, const Points& b, double length_mm);
+
+/// Shapes of a random field with covariance exp(−|a − b|² / (2 length²)), largest first, each one standard deviation:
+/// its Karhunen–Loève modes, by Nyström's method on up to 60 centres spread over the points. Those under a thousandth
+/// of the largest variance are left out.
+/// @return  #points by at most @p most
+Eigen::MatrixXd field_modes(const Points& points, double length_mm, int most = 60);
+
+/// Columns less their projection on @p shape under @p weight (#points).
+Eigen::MatrixXd without(const Eigen::VectorXd& shape, const Eigen::VectorXd& weight, Eigen::MatrixXd columns);
+
+}  // namespace supine::diagnosis

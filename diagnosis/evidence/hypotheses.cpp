@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/evidence/hypotheses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "common/error.h"
+#include "diagnosis/weighted_fit.h"
+#include "simulation/catalogue.h"
+#include "simulation/parameters.h"
+
+namespace supine::diagnosis {
+namespace {
+
+constexpr std::size_t pairs_for_triples = 10;
+constexpr double least_rest = 0.3;  // of the usual size: a shorter secant is no better than the slope
+
+double binomial(std::size_t n, std::size_t k) {
+  double value = 1;
+  for (std::size_t i = 0; i < k; ++i) value *= static_cast<double>(n - i) / static_cast<double>(i + 1);
+  return value;
+}
+
+/// Rows of the nuisances that an effect replaces: those of its own kind that are one for all poses.
+std::vector<int> replaced_by(const BaseFit& base, const std::string& effect) {
+  std::vector<int> rows;
+  const auto moduli = static_cast<int>(base.fit.u.size());
+  for (std::size_t k = 0; k < base.nuisances.size(); ++k)
+    if (base.nuisances[k].effect == effect && base.nuisances[k].pose.empty())
+      rows.push_back(moduli + static_cast<int>(k));
+  return rows;
+}
+
+/// What these say, in the effect's own unit.
+double already_said(const BaseFit& base, const std::string& effect) {
+  double already = 0;
+  for (const int row : replaced_by(base, effect)) {
+    const Nuisance& nuisance = base.nuisances[static_cast<std::size_t>(row - base.fit.u.size())];
+    already += nuisance.value * nuisance.sigma;
+  }
+  return already;
+}
+
+}  // namespace
+
+int Hypothesis::place_of(const std::string& name) const {
+  const auto& names = evidence->directions().names;
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    if (names[static_cast<std::size_t>(rows[k])] == name) return static_cast<int>(k);
+  return -1;
+}
+
+double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t size) {
+  return std::log(priors.of_sets.at(size) / binomial(candidates, size));
+}
+
+void normalise(std::vector<Hypothesis>& hypotheses) {
+  double most = -1e300, sum = 0;
+  for (const Hypothesis& h : hypotheses) most = std::max(most, h.ln_prior + h.ln_evidence);
+  for (Hypothesis& h : hypotheses) sum += h.probability = std::exp(h.ln_prior + h.ln_evidence - most);
+  for (Hypothesis& h : hypotheses) h.probability /= sum;
+  std::stable_sort(hypotheses.begin(), hypotheses.end(),
+                   [](const Hypothesis& a, const Hypothesis& b) { return a.probability > b.probability; });
+}
+
+double inclusion(const std::vector<Hypothesis>& hypotheses, int effect) {
+  double sum = 0;
+  for (const Hypothesis& h : hypotheses)
+    if (std::find(h.effects.begin(), h.effects.end(), effect) != h.effects.end()) sum += h.probability;
+  return sum;
+}
+
+Screening::Screening(const BaseFit& base, const std::vector<Candidate>& candidates, const Priors& priors)
+    : priors_(priors), count_(candidates.size()) {
+  Directions all = base_directions(base);
+  base_rows_.resize(static_cast<std::size_t>(all.size()));
+  std::iota(base_rows_.begin(), base_rows_.end(), 0);
+  for (const Candidate& candidate : candidates) {
+    const std::vector<int> replaced = replaced_by(base, candidate.effect);
+    const double already = already_said(base, candidate.effect);
+    std::vector<int> rows;
+    const Eigen::MatrixXd slope = base.clusters.means(candidate.slope);
+    for (std::size_t k = 0; k < candidate.parameters.size(); ++k) {
+      const CandidateParameter& p = candidate.parameters[k];
+      const StrengthPrior prior = strength_prior(candidate.effect, *simulation::find_parameter(p.name));
+      Eigen::VectorXd column = slope.col(static_cast<Eigen::Index>(k));
+      if (candidate.secant.size() > 0) column = base.clusters.means(candidate.secant) / (prior.median - p.null);
+      rows.push_back(static_cast<int>(all.size()));
+      const double mean = prior.mean() - p.null - already;
+      all.add(p.name, column, mean, prior.sd());
+      if (prior.log_normal) all.cut_below(-already);
+    }
+    of_effect_.push_back(rows);
+    replaced_.push_back(replaced);
+  }
+  evidence_ = std::make_shared<LinearEvidence>(*base.covariance, base.distances(base.fit.residuals), std::move(all));
+  const int count = static_cast<int>(count_);
+  hypotheses_.push_back(weigh({}));
+  for (int a = 0; a < count; ++a) hypotheses_.push_back(weigh({a}));
+  std::vector<Hypothesis> pairs;
+  for (int a = 0; a < count; ++a)
+    for (int b = a + 1; b < count; ++b) pairs.push_back(weigh({a, b}));
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const Hypothesis& a, const Hypothesis& b) { return a.ln_evidence > b.ln_evidence; });
+  std::set<std::vector<int>> triples;
+  for (std::size_t p = 0; p < std::min(pairs_for_triples, pairs.size()); ++p)
+    for (int c = 0; c < count; ++c) {
+      std::vector<int> three = pairs[p].effects;
+      if (std::find(three.begin(), three.end(), c) != three.end()) continue;
+      three.push_back(c);
+      std::sort(three.begin(), three.end());
+      triples.insert(three);
+    }
+  hypotheses_.insert(hypotheses_.end(), pairs.begin(), pairs.end());
+  for (const auto& three : triples) hypotheses_.push_back(weigh(three));
+  normalise(hypotheses_);
+}
+
+Hypothesis Screening::weigh(std::vector<int> effects) const {
+  Hypothesis h;
+  h.ln_prior = ln_prior_of_set(priors_, count_, effects.size());
+  h.rows = base_rows_;
+  for (const int effect : effects) {
+    const auto e = static_cast<std::size_t>(effect);
+    std::erase_if(h.rows, [&](int row) {
+      return std::find(replaced_[e].begin(), replaced_[e].end(), row) != replaced_[e].end();
+    });
+    h.rows.insert(h.rows.end(), of_effect_[e].begin(), of_effect_[e].end());
+  }
+  h.effects = std::move(effects);
+  h.evidence = evidence_;
+  h.weighed = evidence_->weigh(h.rows);
+  h.ln_evidence = h.weighed.ln_evidence;
+  return h;
+}
+
+void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, std::vector<Candidate>& candidates) {
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    const auto& rows = candidates[c].parameters;
+    const simulation::Parameter* row = simulation::find_parameter(rows[0].name);
+    if (rows.size() != 1 || row->median == row->null) continue;
+    simulation::Model model = base.model;
+    model.effects.push_back(simulation::null_setting(*simulation::find_effect(candidates[c].effect)));
+    const double usual = row->median - row->null, rest = usual - already_said(base, candidates[c].effect);
+    if (std::abs(rest) < least_rest * std::abs(usual)) continue;
+    model.effects.back().parameters[row->name].value = row->null + rest;
+    try {
+      calibration::Evaluator evaluator(scene, model, accurate_enough());
+      const calibration::Prediction moved = evaluator.predict(model, &base.fit.prediction.solution);
+      const auto there = calibration::residuals_of(scene, moved, base.fit.mask, base.noise_mm);
+      candidates[c].secant = (usual / rest) * (there.distance_mm - base.fit.residuals.distance_mm);
+    } catch (const NumericalFailure&) {
+      // No equilibrium at the usual size: the slope at the null has to do.
+    }
+  }
+}
+
+}  // namespace supine::diagnosis

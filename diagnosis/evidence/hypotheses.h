@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "diagnosis/candidates.h"
+#include "diagnosis/evidence/base_fit.h"
+
+namespace supine::diagnosis {
+
+/// A set of effects that may be missing, and how likely it is.
+struct Hypothesis {
+  std::vector<int> effects;   ///< rows of the candidates, ascending; none: nothing is missing
+  double ln_prior = 0;        ///< of the set
+  double ln_evidence = 0;     ///< up to what is the same for all
+  double probability = 0;     ///< posterior, over all that were weighed
+  bool refitted = false;      ///< through the whole chain, else along straight lines
+  Weighed weighed;            ///< by rows
+  std::vector<int> rows;      ///< of the evidence's directions
+  std::shared_ptr<const LinearEvidence> evidence;  ///< it was weighed by
+
+  /// Place of a direction in `weighed`, or -1.
+  int place_of(const std::string& name) const;
+};
+
+/// Every hypothesis weighed along straight lines from the base fit: none, all singles, all pairs, triples on the best
+/// pairs. An effect of one number that has a usual size goes along the secant to it, the others along their slopes.
+class Screening {
+ public:
+  Screening(const BaseFit& base, const std::vector<Candidate>& candidates, const Priors& priors);
+
+  /// Most probable first.
+  const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
+
+ private:
+  Hypothesis weigh(std::vector<int> effects) const;
+
+  Priors priors_;
+  std::size_t count_;
+  std::vector<int> base_rows_;
+  std::vector<std::vector<int>> of_effect_, replaced_;  // rows of the directions
+  std::shared_ptr<const LinearEvidence> evidence_;
+  std::vector<Hypothesis> hypotheses_;
+};
+
+/// ln of the prior of one set of @p size out of @p candidates effects.
+double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t size);
+
+/// Fills the probabilities and puts the most probable first.
+void normalise(std::vector<Hypothesis>& hypotheses);
+
+/// Σ of the probabilities of what holds the effect.
+double inclusion(const std::vector<Hypothesis>& hypotheses, int effect);
+
+/// Change of the distances by the usual size of every candidate of one number that has one, solved with the model of
+/// the base fit: Candidate::secant. Where a nuisance says some of it already, it is what the rest of it changes, as if
+/// all of it did.
+void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, std::vector<Candidate>& candidates);
+
+}  // namespace supine::diagnosis

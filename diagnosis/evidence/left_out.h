@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "diagnosis/evidence/hypotheses.h"
+
+namespace supine::diagnosis {
+
+/// What is predicted from the rest: rows of the clusters.
+struct LeftOut {
+  std::string name;  ///< a pose, or "a block of skin"
+  std::vector<int> clusters;
+};
+
+/// Every pose where several are measured, else six blocks of skin (calibration/held_out.h).
+std::vector<LeftOut> left_out_parts(const calibration::MeasuredScene& scene, const BaseFit& base);
+
+/// ln p(part | rest) of a hypothesis less that of another: > 0 where the first predicts what was left out better, under
+/// all errors, nuisances and the discrepancy.
+double left_out_gain(const BaseFit& base, const Hypothesis& first, const Hypothesis& second, const LeftOut& part);
+
+}  // namespace supine::diagnosis

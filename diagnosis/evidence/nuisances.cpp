@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/evidence/nuisances.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "simulation/catalogue.h"
+#include "simulation/parameters.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using simulation::Effect;
+using simulation::EffectSetting;
+using simulation::Model;
+
+constexpr const char* springs[] = {"interface.normal_kpa_per_mm", "cut.stiffness_kpa_per_mm"};
+
+bool has(const Model& model, const std::string& effect) {
+  return std::any_of(model.effects.begin(), model.effects.end(),
+                     [&effect](const EffectSetting& setting) { return setting.name == effect; });
+}
+
+void add_of_effect(const Effect& effect, const std::vector<std::string>& poses, const simulation::MeasurementTolerances& known,
+                   std::vector<Nuisance>& list) {
+  const simulation::EffectTraits traits = effect.traits();
+  for (const simulation::Parameter& row : effect.parameters()) {
+    const double sigma = effect.tolerance(row.unit, known);
+    if (row.shape || sigma == 0) continue;
+    if (!traits.error_of_each_scan)
+      list.push_back({traits.error_source, {}, effect.name(), row.name, sigma, {}});
+    for (const std::string& pose : poses)
+      if (traits.error_of_each_scan && pose != "prone")
+        list.push_back({traits.error_source, pose, effect.name(), row.name, sigma, {}});
+  }
+}
+
+EffectSetting& setting_of(std::vector<EffectSetting>& settings, const std::string& effect) {
+  for (EffectSetting& setting : settings)
+    if (setting.name == effect) return setting;
+  settings.push_back(simulation::null_setting(*simulation::find_effect(effect)));
+  return settings.back();
+}
+
+}  // namespace
+
+std::vector<Nuisance> nuisances_of(const Model& model, const std::vector<std::string>& poses,
+                                   const simulation::MeasurementTolerances& known) {
+  std::vector<Nuisance> list;
+  for (const Effect* effect : simulation::catalogue()) {
+    const simulation::EffectTraits traits = effect->traits();
+    if (traits.error_source.empty() || (has(model, effect->name()) && !traits.error_of_each_scan)) continue;
+    add_of_effect(*effect, poses, known, list);
+  }
+  for (const std::string name : springs)
+    if (const simulation::Setting& setting = simulation::base_setting(model, name); !setting.free && setting.value > 0)
+      list.push_back({"springs", {}, {}, name, known.spring_log, {}});
+  return list;
+}
+
+Model with_nuisances(Model model, const std::vector<Nuisance>& nuisances, const std::vector<std::string>& poses) {
+  for (const Nuisance& nuisance : nuisances) {
+    if (nuisance.value == 0) continue;
+    const double change = nuisance.value * nuisance.sigma;
+    if (nuisance.effect.empty()) simulation::base_setting(model, nuisance.parameter).value *= std::exp(change);
+    for (const std::string& pose : poses)
+      if (!nuisance.effect.empty() && (nuisance.pose.empty() || nuisance.pose == pose))
+        setting_of(model.of_pose[pose], nuisance.effect).parameters[nuisance.parameter].value += change;
+  }
+  return model;
+}
+
+void find_shapes(calibration::Evaluator& evaluator, const simulation::Sensitivities& sensitivities, const Model& model,
+                 const calibration::Prediction& prediction, const calibration::Residuals& residuals,
+                 std::vector<Nuisance>& nuisances) {
+  std::map<std::string, Eigen::VectorXd> slopes;  // of what is another number in each pose, for all poses at once
+  const auto& measurements = evaluator.scene().measurements;
+  for (Nuisance& nuisance : nuisances) {
+    const bool base = nuisance.effect.empty();
+    const std::string name = base ? nuisance.parameter : nuisance.effect + "." + nuisance.parameter;
+    Eigen::VectorXd& slope = slopes[name];
+    if (slope.size() == 0) slope = slope_at(evaluator, model, prediction, residuals, name, sensitivities.of(name));
+    const double unit = base ? simulation::base_setting(model, name).value : 1;
+    nuisance.shape_mm = nuisance.sigma * unit * slope;
+    for (Eigen::Index r = 0; r < residuals.size(); ++r)
+      if (!nuisance.pose.empty() && measurements[static_cast<std::size_t>(residuals.pose[r])]->pose.name != nuisance.pose)
+        nuisance.shape_mm[r] = 0;
+  }
+}
+
+}  // namespace supine::diagnosis

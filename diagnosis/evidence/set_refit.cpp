@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/evidence/set_refit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "calibration/held_out.h"
+#include "common/error.h"
+#include "common/rms.h"
+#include "common/statistics.h"
+#include "diagnosis/evidence/fit_errors.h"
+#include "simulation/catalogue.h"
+#include "simulation/parameters.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::FreeParameters;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Nuisances that no effect of the set replaces.
+std::vector<Nuisance> kept(const BaseFit& base, const std::vector<std::string>& effects) {
+  std::vector<Nuisance> list = base.nuisances;
+  std::erase_if(list, [&effects](const Nuisance& nuisance) {
+    return nuisance.pose.empty() && std::find(effects.begin(), effects.end(), nuisance.effect) != effects.end();
+  });
+  return list;
+}
+
+/// Base numbers where the base fit has them, strengths where the screening has them.
+VectorXd start_of(const FreeParameters& parameters, const BaseFit& base, const std::vector<Candidate>& candidates,
+                  const Hypothesis& screened) {
+  VectorXd u = parameters.start();
+  const auto& names = parameters.names();
+  for (Index i = 0; i < u.size(); ++i) {
+    const std::string& name = names[static_cast<std::size_t>(i)];
+    const auto& own = base.parameters->names();
+    const auto found = std::find(own.begin(), own.end(), name);
+    if (found != own.end()) u[i] = base.fit.u[found - own.begin()];
+    const int place = screened.place_of(name);
+    if (found != own.end() || place < 0) continue;
+    for (const int effect : screened.effects)
+      for (const CandidateParameter& p : candidates[static_cast<std::size_t>(effect)].parameters) {
+        if (p.name != name) continue;
+        const double reach = 3 * p.typical;  // a line drawn further than that is no longer the effect
+        const double value = p.null + std::clamp(screened.weighed.number(place).first, -reach, reach);
+        const double least = parameters.is_log(i) ? 0.1 * p.typical : -1e300;
+        u[i] = parameters.coordinate(i, std::max(value, least));
+      }
+  }
+  return parameters.clamped(u);
+}
+
+Directions directions_at(const calibration::Fit& fit, const FreeParameters& parameters,
+                         const std::vector<Nuisance>& nuisances, const calibration::Clusters& clusters) {
+  constexpr double open = 3;  // coordinates: nothing is believed of it
+  Directions all;
+  const Eigen::MatrixXd slope = clusters.means(fit.linearisation.slope);
+  const VectorXd unit = parameters.slope(fit.u);
+  for (Index i = 0; i < slope.cols(); ++i) {
+    const auto& prior = parameters.priors()[static_cast<std::size_t>(i)];
+    all.add(parameters.names()[static_cast<std::size_t>(i)], slope.col(i), prior ? prior->mean - fit.u[i] : 0,
+            prior ? prior->sd : open, parameters.value(i, fit.u[i]), unit[i]);
+  }
+  for (const Nuisance& nuisance : nuisances)
+    all.add(nuisance.name(), clusters.means(nuisance.shape_mm), -nuisance.value, 1, nuisance.value * nuisance.sigma,
+            nuisance.sigma);
+  return all;
+}
+
+std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParameters& parameters) {
+  std::vector<FittedParameter> list;
+  for (Index i = 0; i < parameters.size(); ++i) {
+    const std::string& name = parameters.names()[static_cast<std::size_t>(i)];
+    const std::string effect = name.substr(0, name.find('.'));
+    if (std::find(refit.effects.begin(), refit.effects.end(), effect) == refit.effects.end()) continue;
+    const auto [offset, sd] = refit.hypothesis.weighed.number(i);
+    const double u = refit.fit.u[i] + offset, reach = normal_reach95() * sd;
+    const auto value = [&](double at) {
+      return parameters.value(i, std::clamp(at, parameters.lower()[i], parameters.upper()[i]));
+    };
+    list.push_back({name, parameters.unit(i), value(u), value(u - reach), value(u + reach)});
+  }
+  return list;
+}
+
+bool is_at_border(const Refit& refit, const FreeParameters& parameters) {
+  constexpr double close = 0.01;  // of the range
+  for (Index i = 0; i < parameters.size(); ++i) {
+    if (!simulation::find_parameter(parameters.names()[static_cast<std::size_t>(i)])->shape) continue;
+    const double low = parameters.lower()[i], high = parameters.upper()[i], u = refit.fit.u[i];
+    if (std::min(u - low, high - u) < close * (high - low)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+simulation::EffectSetting free_setting(const std::string& name) {
+  constexpr double least_share = 1e-3;  // of the usual size: where the logarithm of a strength ends
+  const simulation::Effect& effect = *simulation::find_effect(name);
+  simulation::EffectSetting setting = simulation::null_setting(effect);
+  for (const simulation::Parameter& row : effect.parameters()) {
+    const StrengthPrior prior = strength_prior(name, row);
+    simulation::Setting& number = setting.parameters[row.name];
+    number = {row.median, true, prior.spread, row.lower, row.upper};
+    if (row.shape) number.prior_sd = simulation::prior_sd(row);
+    if (!row.shape && prior.log_normal) {
+      number.lower = std::max(row.lower, least_share * row.median);
+      number.prior_sd = row.median * std::expm1(prior.spread);
+    }
+  }
+  return setting;
+}
+
+double held_out_rms(const calibration::Fit& fit, const FreeParameters& parameters,
+                    const std::vector<Nuisance>& nuisances) {
+  const Index moduli = parameters.size(), count = moduli + static_cast<Index>(nuisances.size());
+  Eigen::MatrixXd slope(fit.residuals.size(), count);
+  slope.leftCols(moduli) = fit.linearisation.slope;
+  VectorXd information = VectorXd::Ones(count);
+  information.head(moduli) = parameters.prior_information();
+  for (std::size_t k = 0; k < nuisances.size(); ++k)
+    slope.col(moduli + static_cast<Index>(k)) = nuisances[k].shape_mm;
+  return rms(calibration::held_out_distances(fit.residuals, slope, information,
+                                             calibration::spatial_blocks(fit.residuals)));
+}
+
+Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
+            const std::vector<Candidate>& candidates, const Hypothesis& screened) {
+  Refit result;
+  simulation::Model model = given;
+  for (const int effect : screened.effects) {
+    result.effects.push_back(candidates[static_cast<std::size_t>(effect)].effect);
+    model.effects.push_back(free_setting(result.effects.back()));
+  }
+  const std::vector<Nuisance> nuisances = kept(base, result.effects);
+  std::vector<std::string> poses{scene.prone.name};
+  for (const auto* measurement : scene.measurements) poses.push_back(measurement->pose.name);
+  const FreeParameters parameters(with_nuisances(model, nuisances, poses));
+  const FitErrors errors(base, nuisances, base.size_of(screened.weighed));
+  try {
+    calibration::Evaluator evaluator(scene, parameters.base(), accurate_enough());
+    WeightedFit fit = weigh(evaluator, parameters, errors.metric(), start_of(parameters, base, candidates, screened),
+                            &base.fit.prediction.solution);
+    descend(evaluator, parameters, errors.metric(), DescentOptions{}, fit);
+    result.fit = std::move(fit.solution);
+  } catch (const NumericalFailure&) {
+    return result;  // no equilibrium where the screening has it
+  }
+  result.solved = true;
+  Hypothesis& h = result.hypothesis;
+  h = screened;
+  h.refitted = true;
+  h.evidence = std::make_shared<LinearEvidence>(*base.covariance, base.distances(result.fit.residuals),
+                                                directions_at(result.fit, parameters, nuisances, base.clusters));
+  h.rows.resize(static_cast<std::size_t>(h.evidence->directions().size()));
+  std::iota(h.rows.begin(), h.rows.end(), 0);
+  h.weighed = h.evidence->weigh(h.rows);
+  h.ln_evidence = h.weighed.ln_evidence;
+  result.model = FreeParameters(model).model(result.fit.u);
+  result.parameters = parameters_of(result, parameters);
+  result.at_border = is_at_border(result, parameters);
+  result.rms_mm = rms(result.fit.residuals.distance_mm);
+  result.held_out_rms_mm = held_out_rms(result.fit, parameters, nuisances);
+  return result;
+}
+
+}  // namespace supine::diagnosis

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "diagnosis/evidence/hypotheses.h"
+
+namespace supine::diagnosis {
+
+/// A parameter of a refit, with its 95 % interval, cut at its range.
+struct FittedParameter {
+  std::string name, unit;
+  double value, low, high;
+};
+
+/// A set of effects added to the model, and everything free fitted again through the whole chain.
+struct Refit {
+  std::vector<std::string> effects;
+  bool solved = false;                      ///< whether the chain found an equilibrium; nothing below holds otherwise
+  bool at_border = false;                   ///< whether a place or width ended at the border of its range
+  double rms_mm = 0, held_out_rms_mm = 0;   ///< fitted points; every block of skin without itself
+  std::vector<FittedParameter> parameters;  ///< of the effects
+  Hypothesis hypothesis;                    ///< weighed there, without its probability
+  simulation::Model model;                  ///< with the effects and the fitted numbers, without nuisances
+  calibration::Fit fit;
+};
+
+/// The effect with its strengths free from @ref strength_prior and its place and shape free from the catalogue's
+/// priors.
+simulation::EffectSetting free_setting(const std::string& effect);
+
+/// Follows a screened hypothesis through the chain: Levenberg-Marquardt in moduli, strengths (in their logarithm where
+/// that is their prior), places and widths from where the screening has them, nuisances and discrepancy as errors, at
+/// the size of the discrepancy that the screening has likeliest. Laplace's evidence there for every size.
+/// @param given  the base model: where its priors stand
+Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
+            const std::vector<Candidate>& candidates, const Hypothesis& screened);
+
+/// Held-out RMS of a fit: blocks of skin, each predicted without itself, nuisances fitted along.
+double held_out_rms(const calibration::Fit& fit, const calibration::FreeParameters& parameters,
+                    const std::vector<Nuisance>& nuisances);
+
+}  // namespace supine::diagnosis

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+// What nuisances, uneven bodies and unknown forces do to the distances, against the chain solved again.
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "diagnosis/evidence/discrepancy.h"
+#include "diagnosis/evidence/nuisances.h"
+#include "diagnosis/evidence/patchiness.h"
+#include "diagnosis/weighted_fit.h"
+#include "simulation/parameters.h"
+#include "tests/calibration/twin.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using supine::testing::Twin;
+
+struct Solved {
+  Twin twin{{supine::testing::twin_truth(), 0.3}};
+  simulation::Model model = supine::testing::twin_truth();
+  calibration::Evaluator evaluator{twin.scene(), model, accurate_enough()};
+  calibration::Prediction prediction = evaluator.predict(model);
+  calibration::PointMask mask = calibration::points_over_skin(prediction);
+  calibration::Residuals residuals = calibration::residuals_of(twin.scene(), prediction, mask, {0.3});
+  simulation::Sensitivities sensitivities{evaluator.chain(), model, prediction.solution};
+
+  Eigen::VectorXd distances_of(const simulation::Model& other) {
+    return calibration::residuals_of(twin.scene(), evaluator.predict(other, &prediction.solution), mask, {0.3})
+        .distance_mm;
+  }
+};
+
+TEST(Nuisances, ShapesAreTheSlopesOfTheModelThatCarriesThem) {
+  Solved solved;
+  const std::vector<std::string> poses = {"prone", "supine"};
+  simulation::MeasurementTolerances known = Priors::known_by_default();
+  std::vector<Nuisance> all = nuisances_of(solved.model, poses, known);
+  find_shapes(solved.evaluator, solved.sensitivities, solved.model, solved.prediction, solved.residuals, all);
+  for (const char* name : {"supine/misregistration.turn_x_rad", "supine/gravity_tilt.roll_rad",
+                           "supine/chest_wall_motion.amplitude_mm", "/adhesion.log_factor",
+                           "/incompressibility.log_factor", "/interface.normal_kpa_per_mm"}) {
+    std::vector<Nuisance> moved = all;
+    double step = 0;
+    const Nuisance* of = nullptr;
+    for (Nuisance& nuisance : moved)
+      if (nuisance.name() == name) nuisance.value = step = 0.02, of = &nuisance;
+    ASSERT_NE(of, nullptr) << name;
+    const Eigen::VectorXd up = solved.distances_of(with_nuisances(solved.model, moved, poses));
+    for (Nuisance& nuisance : moved) nuisance.value *= -1;
+    const Eigen::VectorXd down = solved.distances_of(with_nuisances(solved.model, moved, poses));
+    const Eigen::VectorXd slope = (up - down) / (2 * step);
+    EXPECT_GT(slope.norm(), 1e-3) << name;
+    EXPECT_LT((slope - of->shape_mm).norm(), 0.02 * slope.norm()) << name;
+  }
+}
+
+TEST(Nuisances, WhatTheModelFitsOrHasAsAnEffectIsNotThereTwice) {
+  simulation::Model model = supine::testing::twin_truth();
+  const auto names_of = [&model] {
+    std::vector<std::string> names;
+    for (const Nuisance& n : nuisances_of(model, {"prone", "supine"}, Priors::known_by_default()))
+      names.push_back(n.name());
+    return names;
+  };
+  const auto has = [&](const std::string& name) {
+    const auto names = names_of();
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  EXPECT_TRUE(has("/adhesion.log_factor"));
+  EXPECT_TRUE(has("/cut.stiffness_kpa_per_mm"));
+  EXPECT_FALSE(has("prone/misregistration.shift_x_mm")) << "the image lies where it lies";
+  model.effects = {simulation::null_setting(*simulation::find_effect("adhesion")),
+                   simulation::null_setting(*simulation::find_effect("misregistration"))};
+  model.cut.stiffness_kpa_per_mm.free = true;
+  EXPECT_FALSE(has("/adhesion.log_factor"));
+  EXPECT_FALSE(has("/cut.stiffness_kpa_per_mm"));
+  EXPECT_TRUE(has("supine/misregistration.shift_x_mm")) << "each scan still lies elsewhere in its own way";
+}
+
+TEST(Sensitivities, AlongADirectionOfTheFieldsAreThoseOfTheParameterThatChangesThemSo) {
+  Solved solved;
+  const simulation::ChainDerivative by_name = solved.sensitivities.of("breast.young_modulus_kpa");
+  const double young = solved.model.breast.young_modulus_kpa.value;
+  const simulation::ChainDerivative by_field =
+      solved.sensitivities.along([young](const simulation::PoseLoad&, simulation::Fields<simulation::Dual>& fields) {
+        for (Eigen::Index c = 0; c < fields.ln_young.size(); ++c) fields.ln_young[c].v[0] = 1 / young;
+      });
+  EXPECT_LT((by_name.poses[0] - by_field.poses[0]).norm(), 1e-9 * by_name.poses[0].norm());
+  EXPECT_LT((by_name.X - by_field.X).norm(), 1e-9 * by_name.X.norm());
+}
+
+TEST(Sensitivities, ForcesOnNodesMoveWhatTheTangentSays) {
+  Solved solved;
+  const Points& x = solved.prediction.solution.poses[0].x;
+  Eigen::VectorXd weight = Eigen::VectorXd::Zero(x.size());
+  for (Eigen::Index n = 0; n < x.rows(); ++n) weight[3 * n + 1] = 1;
+  const Points moved = solved.sensitivities.moved_by(0, weight);
+  EXPECT_GT(moved.col(1).mean(), 0) << "with the force";
+  EXPECT_LT((solved.sensitivities.moved_by(0, 2 * weight) - 2 * moved).norm(), 1e-9 * moved.norm());
+}
+
+TEST(Patchiness, ShapesLeaveOutWhatTheModuliMakeUpForAndGrowWithTheirSize) {
+  Solved solved;
+  const auto shapes = [&solved](const Patchiness& size) {
+    return patchiness_shapes(solved.evaluator.chain(), solved.sensitivities, solved.prediction, solved.residuals, size);
+  };
+  const Eigen::MatrixXd usual = shapes({});
+  EXPECT_GT(usual.cols(), 30);
+  Patchiness twice;
+  twice.tissue *= 2, twice.skin *= 2, twice.muscle_mm *= 2;
+  EXPECT_LT((shapes(twice) - 2 * usual).norm(), 1e-9 * usual.norm());
+  const double rms = std::sqrt(usual.squaredNorm() / static_cast<double>(usual.rows()));
+  EXPECT_GT(rms, 0.05);
+  EXPECT_LT(rms, 3);
+}
+
+TEST(Discrepancy, HasAMeanSquareOfOneAndIsACovariance) {
+  Solved solved;
+  const calibration::Clusters clusters = calibration::cluster_points(solved.residuals, 200);
+  const Eigen::MatrixXd kernel =
+      discrepancy_kernel(solved.twin.mesh, solved.sensitivities, solved.prediction, solved.residuals, clusters);
+  EXPECT_NEAR(kernel.diagonal().mean(), 1, 1e-9);
+  EXPECT_LT((kernel - kernel.transpose()).norm(), 1e-9 * kernel.norm());
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(kernel).eigenvalues()[0], -1e-9 * kernel.norm());
+}
+
+}  // namespace
+}  // namespace supine::diagnosis
