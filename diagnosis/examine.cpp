@@ -24,10 +24,15 @@ using Eigen::VectorXd;
 constexpr double worth_refitting = 0.01;     // screened probability
 constexpr double held_by_refits = 0.99;      // of the screened probability
 constexpr double stands_out = 0.05;          // inclusion from which more than two sets are followed
-constexpr std::size_t refits_when_quiet = 2;
+constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
 
 void tell(const ExamineOptions& options, const std::string& what) {
   if (options.progress) options.progress(what);
+}
+
+const Hypothesis& nothing_of(const Findings& found) {
+  return *std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
+                       [](const Hypothesis& h) { return h.effects.empty(); });
 }
 
 /// Effects that appear in what is screened with at least some probability.
@@ -48,26 +53,45 @@ const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses) {
   return nullptr;
 }
 
+/// The likeliest hypothesis less one effect, not followed yet; nullptr where there is none. Straight lines do the
+/// simpler one wrong beside one that was followed.
+const Hypothesis* simpler_than_first(const std::vector<Hypothesis>& hypotheses) {
+  const Hypothesis& first = hypotheses.front();
+  if (!first.refitted || first.effects.size() < 2) return nullptr;
+  const auto is_simpler = [&first](const Hypothesis& h) {
+    return !h.refitted && h.effects.size() + 1 == first.effects.size() &&
+           std::includes(first.effects.begin(), first.effects.end(), h.effects.begin(), h.effects.end());
+  };
+  const auto found = std::find_if(hypotheses.begin(), hypotheses.end(), is_simpler);
+  return found == hypotheses.end() ? nullptr : &*found;
+}
+
+void follow_one(const Subject& subject, const ExamineOptions& options, const Hypothesis& next, Findings& found) {
+  const std::vector<int> effects = next.effects;
+  std::vector<std::string> names;
+  for (const int e : effects) names.push_back(found.candidates[static_cast<std::size_t>(e)].effect);
+  tell(options, fmt::format("refit with {}", fmt::join(names, " and ")));
+  Refit refit = diagnosis::refit(subject.scene, subject.given, found.base, found.candidates, next);
+  for (Hypothesis& h : found.hypotheses) {
+    if (h.effects != effects) continue;
+    if (refit.solved)
+      h = refit.hypothesis;
+    else
+      h.refitted = true;  // stays as screened
+  }
+  found.refits.push_back(std::move(refit));
+  normalise(found.hypotheses);
+}
+
+/// The likeliest sets, and what is simpler than the one that comes out first.
 void follow(const Subject& subject, const ExamineOptions& options, Findings& found) {
   auto most = static_cast<std::size_t>(options.refits);
   if (!something_stands_out(found)) most = std::min(most, refits_when_quiet);
-  while (found.refits.size() < most) {
-    const Hypothesis* next = next_to_refit(found.hypotheses);
+  for (std::size_t simpler = 0;;) {
+    const Hypothesis* next = found.refits.size() < most ? next_to_refit(found.hypotheses) : nullptr;
+    if (next == nullptr && most > 0 && simpler < most_simpler) next = simpler_than_first(found.hypotheses), ++simpler;
     if (next == nullptr) break;
-    const std::vector<int> effects = next->effects;
-    std::vector<std::string> names;
-    for (const int e : effects) names.push_back(found.candidates[static_cast<std::size_t>(e)].effect);
-    tell(options, fmt::format("refit with {}", fmt::join(names, " and ")));
-    Refit refit = diagnosis::refit(subject.scene, subject.given, found.base, found.candidates, *next);
-    for (Hypothesis& h : found.hypotheses) {
-      if (h.effects != effects) continue;
-      if (refit.solved)
-        h = refit.hypothesis;
-      else
-        h.refitted = true;  // stays as screened
-    }
-    found.refits.push_back(std::move(refit));
-    normalise(found.hypotheses);
+    follow_one(subject, options, *next, found);
   }
   const auto rank = [&found](const Refit& refit) {
     for (const Hypothesis& h : found.hypotheses)
@@ -76,11 +100,6 @@ void follow(const Subject& subject, const ExamineOptions& options, Findings& fou
   };
   std::stable_sort(found.refits.begin(), found.refits.end(),
                    [&rank](const Refit& a, const Refit& b) { return rank(a) > rank(b); });
-}
-
-const Hypothesis& nothing_of(const Findings& found) {
-  return *std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
-                       [](const Hypothesis& h) { return h.effects.empty(); });
 }
 
 /// What was left out, predicted by the likeliest hypothesis with an effect beside the same without it.
@@ -190,7 +209,6 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
                                {options.priors, options.other_meshes, options.progress});
   const calibration::Fit& fit = found->base.fit;
   found->rms_mm = rms(fit.residuals.distance_mm);
-  found->held_out_rms_mm = held_out_rms(fit, *found->base.parameters, found->base.nuisances);
   tell(options, "catalogue");
   found->errors.emplace(found->base, found->base.nuisances, found->base.size_mm);
   found->candidates = find_candidates(evaluator, found->base.model, fit, found->unseen);
@@ -200,6 +218,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
                                   found->errors->whitening(), options.seed);
   tell(options, "evidence");
   found->hypotheses = Screening(found->base, found->candidates, options.priors).hypotheses();
+  found->held_out_rms_mm = held_out_rms(found->base, nothing_of(*found), fit.residuals);
   follow(subject, options, *found);
   found->included = inclusions(found->hypotheses, found->effects(), options.priors);
   ask_what_was_left_out(subject, *found);

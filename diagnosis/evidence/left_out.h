@@ -17,6 +17,11 @@ struct LeftOut {
 /// Every pose where several are measured, else six blocks of skin (calibration/held_out.h).
 std::vector<LeftOut> left_out_parts(const calibration::MeasuredScene& scene, const BaseFit& base);
 
+/// Root mean square distance of the points of a fit, every block of skin predicted without itself: moduli, effects and
+/// nuisances are those of the rest, under all errors and the likeliest discrepancy, which itself predicts nothing.
+/// @param residuals  of the fit that @p h was weighed at
+double held_out_rms(const BaseFit& base, const Hypothesis& h, const calibration::Residuals& residuals);
+
 /// ln p(part | rest) of a hypothesis less that of another: > 0 where the first predicts what was left out better, under
 /// all errors, nuisances and the discrepancy.
 double left_out_gain(const BaseFit& base, const Hypothesis& first, const Hypothesis& second, const LeftOut& part);

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <numeric>
 
-#include "calibration/held_out.h"
 #include "common/error.h"
 #include "common/rms.h"
 #include "common/statistics.h"
 #include "diagnosis/evidence/fit_errors.h"
+#include "diagnosis/evidence/left_out.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
@@ -115,19 +115,6 @@ simulation::EffectSetting free_setting(const std::string& name) {
   return setting;
 }
 
-double held_out_rms(const calibration::Fit& fit, const FreeParameters& parameters,
-                    const std::vector<Nuisance>& nuisances) {
-  const Index moduli = parameters.size(), count = moduli + static_cast<Index>(nuisances.size());
-  Eigen::MatrixXd slope(fit.residuals.size(), count);
-  slope.leftCols(moduli) = fit.linearisation.slope;
-  VectorXd information = VectorXd::Ones(count);
-  information.head(moduli) = parameters.prior_information();
-  for (std::size_t k = 0; k < nuisances.size(); ++k)
-    slope.col(moduli + static_cast<Index>(k)) = nuisances[k].shape_mm;
-  return rms(calibration::held_out_distances(fit.residuals, slope, information,
-                                             calibration::spatial_blocks(fit.residuals)));
-}
-
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
             const std::vector<Candidate>& candidates, const Hypothesis& screened) {
   Refit result;
@@ -164,7 +151,7 @@ Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& gi
   result.parameters = parameters_of(result, parameters);
   result.at_border = is_at_border(result, parameters);
   result.rms_mm = rms(result.fit.residuals.distance_mm);
-  result.held_out_rms_mm = held_out_rms(result.fit, parameters, nuisances);
+  result.held_out_rms_mm = held_out_rms(base, h, result.fit.residuals);
   return result;
 }
 

@@ -37,8 +37,4 @@ simulation::EffectSetting free_setting(const std::string& effect);
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
             const std::vector<Candidate>& candidates, const Hypothesis& screened);
 
-/// Held-out RMS of a fit: blocks of skin, each predicted without itself, nuisances fitted along.
-double held_out_rms(const calibration::Fit& fit, const calibration::FreeParameters& parameters,
-                    const std::vector<Nuisance>& nuisances);
-
 }  // namespace supine::diagnosis

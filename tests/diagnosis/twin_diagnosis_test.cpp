@@ -241,11 +241,10 @@ TEST(TwinDiagnosis, ALadderAddsTwoEffectsOneAfterTheOtherAndShowsWhatElseCouldHa
   const Subject subject = subject_of(twin);
   ExamineOptions options;
   options.other_meshes = false;
-  options.refits = 3;
+  options.refits = 5;
   options.priors = twin_priors();
   const Ladder ladder = climb(subject, options, *examine(subject, options));
-  ASSERT_EQ(ladder.rungs.size(), 3u) << ladder.stopped << " " << ladder.rungs.back().added << " "
-                                     << ladder.rungs.back().probability;
+  ASSERT_EQ(ladder.rungs.size(), 3u) << ladder.stopped;
   std::set<std::string> added;
   for (std::size_t r = 1; r < ladder.rungs.size(); ++r) {
     const Rung &rung = ladder.rungs[r], &before = ladder.rungs[r - 1];
