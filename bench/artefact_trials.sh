@@ -25,7 +25,7 @@ for case in "$@"; do
         THREADS="${THREADS:-0}" calibrate diagnose >"$copy/log" 2>&1 || { echo "$name $trial failed: $(tail -1 "$copy/log")"; continue; }
     fi
     jq -r --arg name "$name" --arg trial "$trial" '[$name, $trial, .verdict, (.missing | join(" or ") | if . == "" then "-" else . end),
-        ([.candidates[].p_value] | min), (.base_held_out_rms_mm * 100 | round / 100), (.candidates | max_by(.bic) | .effect)] | @tsv' \
+        ([.candidates[].p_value] | min), (.base_held_out_rms_mm * 100 | round / 100), .candidates[0].effect] | @tsv' \
       "$copy/out/diagnosis.json" | while IFS=$'\t' read -r n t v m p h b; do
       printf '%-18s %-16s %-16s %-34s %7s %9s %s\n' "$n" "$t" "$v" "$m" "$p" "$h" "$b"
     done

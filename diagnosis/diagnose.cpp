@@ -32,8 +32,8 @@ bool is_measurement(const std::string& effect) {
 /// the likelier.
 template <class Pass>
 std::vector<std::string> likely_effects(const std::vector<Hypothesis>& hypotheses,
-                                        const std::vector<std::string>& effects,
-                                        const std::vector<Inclusion>& included, Pass pass) {
+                                        const std::vector<std::string>& effects, const std::vector<Inclusion>& included,
+                                        Pass pass) {
   std::set<std::string> held;
   double sum = 0;
   for (const Hypothesis& h : hypotheses) {
@@ -44,9 +44,8 @@ std::vector<std::string> likely_effects(const std::vector<Hypothesis>& hypothese
   std::vector<std::string> named;
   for (const Inclusion& one : included)
     if (held.contains(one.effect) && pass(one) && named.size() < most_named) named.push_back(one.effect);
-  std::stable_sort(named.begin(), named.end(), [](const std::string& a, const std::string& b) {
-    return is_measurement(a) && !is_measurement(b);
-  });
+  std::stable_sort(named.begin(), named.end(),
+                   [](const std::string& a, const std::string& b) { return is_measurement(a) && !is_measurement(b); });
   return named;
 }
 

@@ -21,13 +21,13 @@ struct Unexplained {
 struct Inclusion {
   std::string effect;
   double probability = 0;
-  double bayes_factor = 1;     ///< odds of the probability over those of the prior
-  double left_out_gain = 0;    ///< ln density of what was left out, with it less without; 0 where it was not asked for
+  double bayes_factor = 1;   ///< odds of the probability over those of the prior
+  double left_out_gain = 0;  ///< ln density of what was left out, with it less without; 0 where it was not asked for
 };
 
 struct Diagnosis {
   Verdict verdict = Verdict::nothing_missing;
-  std::vector<std::string> missing;  ///< all that is; the whole set when ambiguous; the best when unexplained
+  std::vector<std::string> missing;         ///< all that is; the whole set when ambiguous; the best when unexplained
   std::vector<std::string> ambiguous_rest;  ///< under missing: rivals for one more
   std::string why;                          ///< one sentence
 };

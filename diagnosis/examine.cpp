@@ -21,9 +21,9 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double worth_refitting = 0.01;     // screened probability
-constexpr double held_by_refits = 0.99;      // of the screened probability
-constexpr double stands_out = 0.05;          // inclusion from which more than two sets are followed
+constexpr double worth_refitting = 0.01;  // screened probability
+constexpr double held_by_refits = 0.99;   // of the screened probability
+constexpr double stands_out = 0.05;       // inclusion from which more than two sets are followed
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
 
 void tell(const ExamineOptions& options, const std::string& what) {
@@ -214,8 +214,8 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   found->candidates = find_candidates(evaluator, found->base.model, fit, found->unseen);
   tell(options, "effects at their usual size");
   find_secants(subject.scene, found->base, found->candidates);
-  found->table = score_candidates(fit.residuals, found->errors->metric().mean_mm, fit.linearisation.slope, found->candidates,
-                                  found->errors->whitening(), options.seed);
+  found->table = score_candidates(fit.residuals, found->errors->metric().mean_mm, fit.linearisation.slope,
+                                  found->candidates, found->errors->whitening(), options.seed);
   tell(options, "evidence");
   found->hypotheses = Screening(found->base, found->candidates, options.priors).hypotheses();
   found->held_out_rms_mm = held_out_rms(found->base, nothing_of(*found), fit.residuals);
@@ -225,8 +225,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   find_unexplained(options.seed, *found);
   found->places = find_places(subject, *found);
   found->budget = error_budget(*found);
-  found->diagnosis =
-      decide(found->hypotheses, found->effects(), found->included, found->unexplained, options.priors);
+  found->diagnosis = decide(found->hypotheses, found->effects(), found->included, found->unexplained, options.priors);
   if (found->diagnosis.verdict == Verdict::unexplained) {
     tell(options, "map of missing forces");
     const FitErrors known(found->base, found->base.nuisances, 0);

@@ -44,16 +44,16 @@ struct ScanPlace {
 
 /// All that one examination finds.
 struct Findings {
-  BaseFit base;                        ///< a model that lacks nothing
+  BaseFit base;                            ///< a model that lacks nothing
   double rms_mm = 0, held_out_rms_mm = 0;  ///< of it
   std::vector<Candidate> candidates;
-  std::vector<std::string> unseen;     ///< effects that move no fitted point, here or anywhere
-  std::optional<FitErrors> errors;     ///< of the base model, nuisances and the likeliest discrepancy among them
-  ScoreTable table;                    ///< information: what each effect's score says by itself
-  std::vector<Hypothesis> hypotheses;  ///< most probable first
-  std::vector<Refit> refits;           ///< of some of them, the likelier first
-  std::vector<Inclusion> included;     ///< most probable first
-  Unexplained unexplained;             ///< over all hypotheses
+  std::vector<std::string> unseen;          ///< effects that move no fitted point, here or anywhere
+  std::optional<FitErrors> errors;          ///< of the base model, nuisances and the likeliest discrepancy among them
+  ScoreTable table;                         ///< information: what each effect's score says by itself
+  std::vector<Hypothesis> hypotheses;       ///< most probable first
+  std::vector<Refit> refits;                ///< of some of them, the likelier first
+  std::vector<Inclusion> included;          ///< most probable first
+  Unexplained unexplained;                  ///< over all hypotheses
   std::vector<Unexplained> unexplained_by;  ///< of the first hypotheses_told
   Unexplained left_by_base;                 ///< where nothing is added
   std::vector<ScanPlace> places;
@@ -68,7 +68,7 @@ struct Findings {
   Findings(const Findings&) = delete;
   Findings& operator=(const Findings&) = delete;
 
-  std::vector<std::string> effects() const;       ///< of the candidates
+  std::vector<std::string> effects() const;                              ///< of the candidates
   const Refit* refit_of(const std::vector<std::string>& effects) const;  ///< of that set; nullptr where there is none
 };
 

@@ -106,8 +106,7 @@ class Pose {
     }
     for (Eigen::Index i = 0; i < n; ++i)
       for (Eigen::Index j = 0; j <= i; ++j)
-        sigma(i, j) += shared * std::exp(-(place_.row(i) - place_.row(j)).norm() / length_mm) +
-                       (i == j ? nugget : 0);
+        sigma(i, j) += shared * std::exp(-(place_.row(i) - place_.row(j)).norm() / length_mm) + (i == j ? nugget : 0);
     factor_.compute(sigma);
   }
 

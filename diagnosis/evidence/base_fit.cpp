@@ -65,8 +65,8 @@ void add_shared(const BaseFit& base, const Priors& priors, const VectorXd& share
       if (c.pose[i] != c.pose[j]) continue;
       errors(i, j) += shared_mm[i] * shared_mm[j] * scan(i, j);
       if (base.numerical)
-        errors(i, j) += spread[i] * spread[j] *
-                        std::exp(-(c.place.row(i) - c.place.row(j)).norm() / base.numerical->length_mm);
+        errors(i, j) +=
+            spread[i] * spread[j] * std::exp(-(c.place.row(i) - c.place.row(j)).norm() / base.numerical->length_mm);
     }
 }
 
@@ -94,8 +94,8 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
     const VectorXd coarser = base.clusters.means(base.numerical->coarser_mm);
     base.errors += doubt * doubt.transpose() + coarser * coarser.transpose();
   }
-  base.kernel = discrepancy_kernel(*evaluator.scene().mesh, sensitivities, base.fit.prediction, residuals,
-                                   base.clusters);
+  base.kernel =
+      discrepancy_kernel(*evaluator.scene().mesh, sensitivities, base.fit.prediction, residuals, base.clusters);
   base.scale_mm = std::max(priors.least_unexplained_mm, priors.share_of_way * way_mm(base.fit.prediction));
   base.most_mm = priors.most_unexplained_mm;
   base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);
@@ -184,8 +184,8 @@ class Fitter {
     for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
       base_.fit.u = kept.u, base_.nuisances = now.nuisances;
       const Trial trial = stepped(base_, step);
-      const simulation::ChainSolution near = calibration::extrapolated(
-          kept.prediction.solution, kept.linearisation.by_coordinate, trial.u - kept.u);
+      const simulation::ChainSolution near =
+          calibration::extrapolated(kept.prediction.solution, kept.linearisation.by_coordinate, trial.u - kept.u);
       try {
         predict(trial, &near);
         if (objective(base_, base_.distances(base_.fit.residuals), trial) < before) return true;
@@ -231,11 +231,12 @@ Directions base_directions(const BaseFit& base) {
   for (Index i = 0; i < slopes.cols(); ++i) {
     constexpr double open = 3;  // coordinates: nothing is believed of it
     const auto& prior = base.parameters->priors()[static_cast<std::size_t>(i)];
-    all.add(base.parameters->names()[static_cast<std::size_t>(i)], slopes.col(i), prior ? prior->mean - base.fit.u[i] : 0, prior ? prior->sd : open);
+    all.add(base.parameters->names()[static_cast<std::size_t>(i)], slopes.col(i),
+            prior ? prior->mean - base.fit.u[i] : 0, prior ? prior->sd : open);
   }
   for (const Nuisance& nuisance : base.nuisances)
-    all.add(nuisance.name(), base.clusters.means(nuisance.shape_mm), -nuisance.value, 1, nuisance.value * nuisance.sigma,
-            nuisance.sigma);
+    all.add(nuisance.name(), base.clusters.means(nuisance.shape_mm), -nuisance.value, 1,
+            nuisance.value * nuisance.sigma, nuisance.sigma);
   return all;
 }
 

@@ -48,8 +48,8 @@ Directions base_directions(const BaseFit& base);
 
 struct BaseFitOptions {
   Priors priors;
-  bool other_meshes = true;                                 ///< measure the mesh's error
-  std::function<void(const std::string&)> progress;         ///< may be empty
+  bool other_meshes = true;                          ///< measure the mesh's error
+  std::function<void(const std::string&)> progress;  ///< may be empty
 };
 
 /// Gauss–Newton in the moduli and the nuisances, from the model's values: distances are exact at every step, uneven

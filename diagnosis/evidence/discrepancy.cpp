@@ -53,8 +53,7 @@ Eigen::VectorXd nodal_forces(const Surface& surface, const Eigen::VectorXd& trac
   // A constant traction pulls on the corners of a straight triangle, on the middles of the edges of a curved one.
   const int first = surface.nodes.cols() == 6 ? 3 : 0;
   for (Eigen::Index f = 0; f < traction.size(); ++f)
-    for (int a = first; a < first + 3; ++a)
-      force[3 * surface.nodes(f, a) + axis] += surface.area[f] * traction[f] / 3;
+    for (int a = first; a < first + 3; ++a) force[3 * surface.nodes(f, a) + axis] += surface.area[f] * traction[f] / 3;
   return force;
 }
 

@@ -33,8 +33,7 @@ Eigen::MatrixXd field_modes(const Points& points, double length_mm, int most) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gaussian_kernel(centres, centres, length_mm));
   const Eigen::VectorXd& variance = eigen.eigenvalues();  // ascending
   const Eigen::Index count = variance.size();
-  const auto kept =
-      std::min<Eigen::Index>(most, (variance.array() > least_share * variance[count - 1]).count());
+  const auto kept = std::min<Eigen::Index>(most, (variance.array() > least_share * variance[count - 1]).count());
   const Eigen::MatrixXd along = eigen.eigenvectors().rightCols(kept).rowwise().reverse();
   const Eigen::VectorXd scale = variance.tail(kept).reverse().cwiseSqrt().cwiseInverse();
   return gaussian_kernel(points, centres, length_mm) * along * scale.asDiagonal();

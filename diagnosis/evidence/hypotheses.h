@@ -12,13 +12,13 @@ namespace supine::diagnosis {
 
 /// A set of effects that may be missing, and how likely it is.
 struct Hypothesis {
-  std::vector<int> effects;   ///< rows of the candidates, ascending; none: nothing is missing
-  double ln_prior = 0;        ///< of the set
-  double ln_evidence = 0;     ///< up to what is the same for all
-  double probability = 0;     ///< posterior, over all that were weighed
-  bool refitted = false;      ///< through the whole chain, else along straight lines
-  Weighed weighed;            ///< by rows
-  std::vector<int> rows;      ///< of the evidence's directions
+  std::vector<int> effects;                        ///< rows of the candidates, ascending; none: nothing is missing
+  double ln_prior = 0;                             ///< of the set
+  double ln_evidence = 0;                          ///< up to what is the same for all
+  double probability = 0;                          ///< posterior, over all that were weighed
+  bool refitted = false;                           ///< through the whole chain, else along straight lines
+  Weighed weighed;                                 ///< by rows
+  std::vector<int> rows;                           ///< of the evidence's directions
   std::shared_ptr<const LinearEvidence> evidence;  ///< it was weighed by
 
   /// Place of a direction in `weighed`, or -1.

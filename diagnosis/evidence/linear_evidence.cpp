@@ -88,12 +88,16 @@ std::pair<double, double> Weighed::number(Eigen::Index k) const {
 }
 
 LinearEvidence::LinearEvidence(const ErrorCovariance& errors, const Eigen::VectorXd& y, Directions all)
-    : errors_(errors), all_(std::move(all)), distances_(y), y_(errors.turned(y)), columns_(errors.turned(all_.columns)) {
+    : errors_(errors),
+      all_(std::move(all)),
+      distances_(y),
+      y_(errors.turned(y)),
+      columns_(errors.turned(all_.columns)) {
   for (const double s : errors.sizes_mm()) {
     const Eigen::VectorXd weight = (1 + s * s * errors.lambda().array()).inverse();
     const Eigen::MatrixXd weighted = weight.asDiagonal() * columns_;
-    by_size_.push_back({columns_.transpose() * weighted, weighted.transpose() * y_,
-                        y_.cwiseAbs2().dot(weight), weight.array().log().sum()});
+    by_size_.push_back({columns_.transpose() * weighted, weighted.transpose() * y_, y_.cwiseAbs2().dot(weight),
+                        weight.array().log().sum()});
   }
 }
 
@@ -110,10 +114,10 @@ Weighed LinearEvidence::weigh(const std::vector<int>& which) const {
     a.diagonal() += information;
     const Eigen::LLT<Eigen::MatrixXd> root(a);
     const Eigen::VectorXd theta = root.solve(information.cwiseProduct(m) - gradient);
-    const double f = products.square + 2 * gradient.dot(theta) + theta.dot(gram * theta) +
-                     information.dot((theta - m).cwiseAbs2());
-    double value = -0.5 * f + 0.5 * products.log_weight - sd.array().log().sum() -
-                   root.matrixLLT().diagonal().array().log().sum();
+    const double f =
+        products.square + 2 * gradient.dot(theta) + theta.dot(gram * theta) + information.dot((theta - m).cwiseAbs2());
+    double value =
+        -0.5 * f + 0.5 * products.log_weight - sd.array().log().sum() - root.matrixLLT().diagonal().array().log().sum();
     const Eigen::MatrixXd covariance = root.solve(Eigen::MatrixXd::Identity(a.rows(), a.cols()));
     for (Eigen::Index k = 0; k < theta.size(); ++k) {
       const auto row = static_cast<std::size_t>(which[static_cast<std::size_t>(k)]);

@@ -22,14 +22,13 @@ bool has(const Model& model, const std::string& effect) {
                      [&effect](const EffectSetting& setting) { return setting.name == effect; });
 }
 
-void add_of_effect(const Effect& effect, const std::vector<std::string>& poses, const simulation::MeasurementTolerances& known,
-                   std::vector<Nuisance>& list) {
+void add_of_effect(const Effect& effect, const std::vector<std::string>& poses,
+                   const simulation::MeasurementTolerances& known, std::vector<Nuisance>& list) {
   const simulation::EffectTraits traits = effect.traits();
   for (const simulation::Parameter& row : effect.parameters()) {
     const double sigma = effect.tolerance(row.unit, known);
     if (row.shape || sigma == 0) continue;
-    if (!traits.error_of_each_scan)
-      list.push_back({traits.error_source, {}, effect.name(), row.name, sigma, {}});
+    if (!traits.error_of_each_scan) list.push_back({traits.error_source, {}, effect.name(), row.name, sigma, {}});
     for (const std::string& pose : poses)
       if (traits.error_of_each_scan && pose != "prone")
         list.push_back({traits.error_source, pose, effect.name(), row.name, sigma, {}});
@@ -84,7 +83,8 @@ void find_shapes(calibration::Evaluator& evaluator, const simulation::Sensitivit
     const double unit = base ? simulation::base_setting(model, name).value : 1;
     nuisance.shape_mm = nuisance.sigma * unit * slope;
     for (Eigen::Index r = 0; r < residuals.size(); ++r)
-      if (!nuisance.pose.empty() && measurements[static_cast<std::size_t>(residuals.pose[r])]->pose.name != nuisance.pose)
+      if (!nuisance.pose.empty() &&
+          measurements[static_cast<std::size_t>(residuals.pose[r])]->pose.name != nuisance.pose)
         nuisance.shape_mm[r] = 0;
   }
 }

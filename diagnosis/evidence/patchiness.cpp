@@ -47,8 +47,7 @@ Eigen::MatrixXd muscle_fields(const meshing::Anatomy& anatomy, const simulation:
     const double rest = std::max(0.0, 1 - group.q.row(p).squaredNorm());
     hill[p] = rest * rest * rest;
   }
-  return size.muscle_mm *
-         without(hill, group.area_mm2, field_modes(places, size.muscle_length_mm, most_shapes));
+  return size.muscle_mm * without(hill, group.area_mm2, field_modes(places, size.muscle_length_mm, most_shapes));
 }
 
 }  // namespace

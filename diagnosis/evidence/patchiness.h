@@ -8,8 +8,8 @@ namespace supine::diagnosis {
 
 /// How uneven every body is: standard deviations, and the lengths in mm over which they are alike.
 struct Patchiness {
-  double tissue = 0.25, tissue_length_mm = 20;  ///< of ln E
-  double skin = 0.15, skin_length_mm = 25;      ///< of the ln of the skin's stiffness
+  double tissue = 0.25, tissue_length_mm = 20;    ///< of ln E
+  double skin = 0.15, skin_length_mm = 25;        ///< of the ln of the skin's stiffness
   double muscle_mm = 0.7, muscle_length_mm = 30;  ///< of the muscle's place in every pose but the imaged one
 };
 

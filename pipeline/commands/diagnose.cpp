@@ -51,9 +51,10 @@ class DiagnoseTool : public Tool {
         ->capture_default_str();
     app.add_flag("--no-other-meshes", no_other_meshes_,
                  "do not solve on two other meshes: the mesh is then taken to be exact");
-    app.add_option("--registration-mm", options_.priors.known.registration_mm,
-                   "how well each scan's place is known, 1 sigma per direction, mm; its turn goes with it, 0.75 degrees "
-                   "per mm. 0.3 where markers were used")
+    app.add_option(
+           "--registration-mm", options_.priors.known.registration_mm,
+           "how well each scan's place is known, 1 sigma per direction, mm; its turn goes with it, 0.75 degrees "
+           "per mm. 0.3 where markers were used")
         ->check(CLI::NonNegativeNumber)
         ->capture_default_str();
     app.add_option("--segmentation-mm", options_.priors.known.segmentation_mm,

@@ -84,7 +84,9 @@ std::string next_measurement(const Json& diagnosis) {
 void tell_missing(const Json& diagnosis, const Places& places, Answer& answer) {
   const std::string effect = diagnosis["missing"][0];
   const Json* found = candidate(diagnosis, effect);
-  answer.sentence = fmt::format("The model lacks {}", words(effect));
+  answer.sentence = fmt::format("The model lacks {}", listed(diagnosis["missing"], "and"));
+  if (found != nullptr && found->contains("probability"))
+    answer.sentence += fmt::format(" (probability {:.2f})", number(*found, "probability"));
   const double with = found != nullptr ? number(*found, "held_out_rms_mm") : std::nan("");
   const double without = number(diagnosis, "base_held_out_rms_mm");
   if (with < without)
@@ -122,9 +124,26 @@ void tell_diagnosis(const Json& diagnosis, const Places& places, Answer& answer)
   }
 }
 
+/// "The supine scan lies 2.1 mm and 0.8° from where it was said to lie."
+std::string place_of_scan(const Json& place) {
+  const auto length = [&place](const char* key) {
+    double squares = 0;
+    for (const Json& component : place.at(key)) squares += std::pow(component.get<double>(), 2);
+    return std::sqrt(squares);
+  };
+  return fmt::format("The {} scan lies {:.1f} mm and {:.1f}° from where it was said to lie.", place.value("pose", "?"),
+                     length("shift_mm"), length("turn_deg"));
+}
+
 void add_facts(const Json& diagnosis, const Collected& collected, Answer& answer) {
   if (const std::string spots = where(diagnosis); !spots.empty())
     answer.facts.push_back("Where it is off: " + spots + " (plus: the breast reaches further than the model).");
+  if (const double left = number(diagnosis, "unexplained_mm"); std::isfinite(left))
+    answer.facts.push_back(fmt::format("No effect explains {:.1f} mm of it (95 %: {:.1f} to {:.1f}).", left,
+                                       diagnosis["unexplained95"][0].get<double>(),
+                                       diagnosis["unexplained95"][1].get<double>()));
+  for (const Json& place : diagnosis.value("registration", Json::array()))
+    answer.facts.push_back(place_of_scan(place));
   Json blind = Json::array();
   for (const Json& effect : diagnosis.value("cannot_see", Json::array())) blind.push_back(effect.value("effect", "?"));
   if (!blind.empty()) answer.facts.push_back("This scan could not show: " + listed(blind, "and") + ".");
@@ -132,7 +151,7 @@ void add_facts(const Json& diagnosis, const Collected& collected, Answer& answer
   if (!ladder.is_object() || !ladder.contains("rungs") || ladder["rungs"].size() < 2) return;
   const Json &first = ladder["rungs"].front(), &last = ladder["rungs"].back();
   answer.facts.push_back(
-      fmt::format("Climbing the ladder, the held-out error falls from {:.2f} to {:.2f} mm; noise and mesh alone leave "
+      fmt::format("Climbing the ladder, the held-out error goes from {:.2f} to {:.2f} mm; noise and mesh alone leave "
                   "{:.2f}.",
                   number(first, "held_out_rms_mm"), number(last, "held_out_rms_mm"), number(ladder, "noise_floor_mm")));
 }

@@ -145,8 +145,8 @@ Json alike_json(const diagnosis::ScoreTable& table) {
 }
 
 Json budget_json(const diagnosis::ErrorBudget& b) {
-  return {{"total", b.total},           {"noise", b.noise},           {"registration", b.registration},
-          {"numerical", b.numerical},   {"parameters", b.parameters}, {"patchiness", b.patchiness},
+  return {{"total", b.total},          {"noise", b.noise},           {"registration", b.registration},
+          {"numerical", b.numerical},  {"parameters", b.parameters}, {"patchiness", b.patchiness},
           {"model_form", b.model_form}};
 }
 
@@ -323,8 +323,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["base_parameters"] = Json::object();
   const calibration::FreeParameters& parameters = *found.base.parameters;
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
-    f["base_parameters"][parameters.names()[static_cast<std::size_t>(i)]] =
-        parameters.value(i, found.base.fit.u[i]);
+    f["base_parameters"][parameters.names()[static_cast<std::size_t>(i)]] = parameters.value(i, found.base.fit.u[i]);
   f["nuisances_sigma"] = nuisances_json(found);
   f["budget_mm"] = budget_json(found.budget);
   f["hot_spots"] = Json::array();
@@ -357,10 +356,11 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result) {
   const auto& b = found.budget;
   say_places(run, found);
   say_hypotheses(run, found);
-  run.say(fmt::format("  residual: MAE {:.2f} mm, RMS {:.2f}, held-out {:.2f}; scan noise {:.2f}, registration {:.2f}, "
-                      "numerical {:.2f}, parameters {:.2f}, patchiness {:.2f}, unexplained {:.2f}",
-                      found.base.fit.residuals.distance_mm.cwiseAbs().mean(), b.total, found.held_out_rms_mm, b.noise,
-                      b.registration, b.numerical, b.parameters, b.patchiness, b.model_form));
+  run.say(
+      fmt::format("  residual: MAE {:.2f} mm, RMS {:.2f}, held-out {:.2f}; scan noise {:.2f}, registration {:.2f}, "
+                  "numerical {:.2f}, parameters {:.2f}, patchiness {:.2f}, unexplained {:.2f}",
+                  found.base.fit.residuals.distance_mm.cwiseAbs().mean(), b.total, found.held_out_rms_mm, b.noise,
+                  b.registration, b.numerical, b.parameters, b.patchiness, b.model_form));
   run.say("  where:    " + where(result.hot_spots));
   say_verdict(run, found);
   say_limits(run, result);

@@ -17,10 +17,7 @@ using diagnosis::RungFigures;
 using Json = nlohmann::ordered_json;
 
 Json figures_json(const RungFigures& r) {
-  return {{"added", r.added},
-          {"mae_mm", r.mae_mm},
-          {"rms_mm", r.rms_mm},
-          {"held_out_rms_mm", r.held_out_rms_mm}};
+  return {{"added", r.added}, {"mae_mm", r.mae_mm}, {"rms_mm", r.rms_mm}, {"held_out_rms_mm", r.held_out_rms_mm}};
 }
 
 Json or_null(const std::optional<RungFigures>& figures) { return figures ? figures_json(*figures) : Json(nullptr); }

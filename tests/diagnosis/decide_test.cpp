@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include "diagnosis/diagnose.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "diagnosis/diagnose.h"
 
 namespace supine::diagnosis {
 namespace {
 
 /// As many as the catalogue has.
-const std::vector<std::string> effects = {"ligament", "adhesion", "misregistration", "friction", "creep", "a",
-                                          "b",        "c",        "d",               "e",        "f",     "g",
-                                          "h",        "i",        "j",               "k",        "l"};
+const std::vector<std::string> effects = {
+    "ligament", "adhesion", "misregistration", "friction", "creep", "a", "b", "c", "d", "e", "f", "g", "h", "i", "j",
+    "k",        "l"};
 constexpr Unexplained little{0.2, 0.1, 0.4}, much{1.8, 1.2, 2.3};
 
 /// Hypotheses with these probabilities; the rest is that of "nothing".

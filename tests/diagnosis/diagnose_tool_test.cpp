@@ -51,8 +51,7 @@ TEST_F(DiagnoseTool, TellsEveryStepItBegins) {
 TEST_F(DiagnoseTool, WarnsWhereTheMeshIsTakenToBeExact) {
   const Finished finished = diagnose({"--no-other-meshes"});
   ASSERT_EQ(finished.code, 0) << finished.err;
-  EXPECT_NE(finished.err.find("the mesh is taken to be exact (not asked for)"), std::string::npos)
-      << finished.err;
+  EXPECT_NE(finished.err.find("the mesh is taken to be exact (not asked for)"), std::string::npos) << finished.err;
   const Json json = Json::parse(std::ifstream(found_ / "diagnosis.json"));
   EXPECT_NE(json["warnings"].dump().find("taken to be exact"), std::string::npos) << json["warnings"];
 }

@@ -39,8 +39,10 @@ struct Made {
   explicit Made(int effects = 3) {
     all.add("modulus", VectorXd::Ones(count), 0.2, 0.5);
     for (int e = 0; e < effects; ++e)
-      all.add("effect", ((e + 1) * place.col(0) / 25).array().sin().matrix() +
-                            ((e + 2) * place.col(1) / 30).array().cos().matrix(), 0.3, 0.8);
+      all.add(
+          "effect",
+          ((e + 1) * place.col(0) / 25).array().sin().matrix() + ((e + 2) * place.col(1) / 30).array().cos().matrix(),
+          0.3, 0.8);
   }
 };
 

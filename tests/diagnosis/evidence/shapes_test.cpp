@@ -38,9 +38,9 @@ TEST(Nuisances, ShapesAreTheSlopesOfTheModelThatCarriesThem) {
   simulation::MeasurementTolerances known = Priors::known_by_default();
   std::vector<Nuisance> all = nuisances_of(solved.model, poses, known);
   find_shapes(solved.evaluator, solved.sensitivities, solved.model, solved.prediction, solved.residuals, all);
-  for (const char* name : {"supine/misregistration.turn_x_rad", "supine/gravity_tilt.roll_rad",
-                           "supine/chest_wall_motion.amplitude_mm", "/adhesion.log_factor",
-                           "/incompressibility.log_factor", "/interface.normal_kpa_per_mm"}) {
+  for (const char* name :
+       {"supine/misregistration.turn_x_rad", "supine/gravity_tilt.roll_rad", "supine/chest_wall_motion.amplitude_mm",
+        "/adhesion.log_factor", "/incompressibility.log_factor", "/interface.normal_kpa_per_mm"}) {
     std::vector<Nuisance> moved = all;
     double step = 0;
     const Nuisance* of = nullptr;

@@ -11,22 +11,26 @@ export function run(bin, tool, ...words) {
   return done.stdout;
 }
 
-const candidate = (effect, more) => ({ effect, p_value: 1, predicted_rms_mm: 2, refit_rms_mm: null, held_out_rms_mm: 2.2, held_out_pose_rms_mm: null,
+const candidate = (effect, more) => ({ effect, probability: 0.02, p_value: 1, predicted_rms_mm: 2, refit_rms_mm: null, held_out_rms_mm: 2.2,
   parameters: [{ name: effect + ".size_mm", value: 1.5, unit: "mm", interval95: [1, 2] }], not_told_apart_from: [], same_shape_as: [], power: 0.9,
-  wrong_sign: false, beyond_range: false, refit_finished: null, ...more });
+  wrong_sign: false, beyond_range: false, at_border: null, ...more });
 
-const diagnosis = { verdict: "missing", missing: ["ligament"], why: "no other effect comes near",
-  candidates: [candidate("ligament", { p_value: 0.001, predicted_rms_mm: 1.4, refit_rms_mm: 1.3, held_out_rms_mm: 1.35, refit_finished: true }),
+const diagnosis = { verdict: "missing", missing: ["ligament"], why: "probability 0.95 or more",
+  candidates: [candidate("ligament", { probability: 0.97, p_value: 0.001, predicted_rms_mm: 1.4, refit_rms_mm: 1.3, held_out_rms_mm: 1.35, at_border: false }),
     candidate("<b onload=alert(1)>own_effect", { power: 0.2, wrong_sign: true }), candidate("adhesion", { not_told_apart_from: ["friction"] })],
+  hypotheses: [{ effects: ["ligament"], probability: 0.95, refitted: true, unexplained_mm: 0.5, unexplained95: [0.3, 0.8] },
+    { effects: [], probability: 0.01, refitted: true, unexplained_mm: 1.9, unexplained95: [1.6, 2.3] }],
+  unexplained_mm: 0.5, unexplained95: [0.3, 0.8],
+  registration: [{ pose: "supine", shift_mm: [1, -2, 0.5], turn_deg: [0.2, 0.1, -0.4], sd: [0.4, 0.4, 0.4, 0.2, 0.2, 0.2] }],
   base_mae_mm: 1.7, base_rms_mm: 2.1, base_held_out_rms_mm: 2.3,
-  budget_mm: { total: 2.1, noise: 0.7, registration: 0.3, numerical: 0.4, parameters: 0.1, model_form: 1.9131126469708992 },
+  budget_mm: { total: 2.1, noise: 0.7, registration: 0.3, numerical: 0.4, parameters: 0.1, patchiness: 0.5, model_form: 0.5 },
   hot_spots: [{ area: "upper inner", pose: "supine", area_cm2: 30.5, mean_signed_mm: -1.25, centre_mm: [10, -20, 20] }],
   cannot_see: [{ effect: "creep", power: 0.07 }],
   next_measurement: [{ measurement: "upright", separation: 24.2, closest_pair: "adhesion, friction", mean_power_of_unseen: 0.7, shows: "creep" }], warnings: [] };
 
-const figures = (added, scale) => ({ added, mae_mm: 1.7 * scale, rms_mm: 2.1 * scale, held_out_rms_mm: 2.3 * scale, held_out_pose_rms_mm: null });
-const ladder = { rungs: [{ ...figures("", 1), p_value: 0.001 },
-  { ...figures("ligament", 0.6), p_value: 0.4, controls: { refit_only: figures("", 1), random_other: figures("creep", 0.95) } }],
+const figures = (added, scale) => ({ added, mae_mm: 1.7 * scale, rms_mm: 2.1 * scale, held_out_rms_mm: 2.3 * scale });
+const ladder = { rungs: [{ ...figures("", 1), p_value: 0.001, probability: 1, unexplained_mm: 1.9 },
+  { ...figures("ligament", 0.6), p_value: 0.4, probability: 0.97, unexplained_mm: 0.5, controls: { refit_only: figures("", 1), random_other: figures("creep", 0.95) } }],
   verdict: "missing", missing: ["ligament"], stopped: "nothing_missing: no effect lowers the held-out error", noise_floor_mm: 0.8 };
 
 // The case in `folder`, from a copy of the small run.

@@ -11,10 +11,10 @@
   const rows_of = (d) => d.candidates.map((c) => ({ ...c, name: words(c.effect), sizes: c.parameters.map(interval),
     predicted_fall_mm: d.base_rms_mm - c.predicted_rms_mm, refit_fall_mm: c.refit_rms_mm === null ? null : d.base_rms_mm - c.refit_rms_mm,
     apart: c.not_told_apart_from.map(words).join(", "),
-    note: [c.refit_rms_mm === null && c.wrong_sign ? "wrong sign" : "", c.refit_rms_mm === null && c.beyond_range ? "implausible size" : "", c.refit_finished === false ? "fit given up early" : ""].filter(Boolean).join(", ") }));
+    note: [c.refit_rms_mm === null && c.wrong_sign ? "wrong sign" : "", c.refit_rms_mm === null && c.beyond_range ? "implausible size" : "", c.at_border ? "place at the border of its range" : ""].filter(Boolean).join(", ") }));
 
   const columns = [
-    { title: "effect", key: "name" }, { title: "p", key: "p_value", n: true, show: p_value },
+    { title: "effect", key: "name" }, { title: "probability", key: "probability", digits: 2 }, { title: "p", key: "p_value", n: true, show: p_value },
     { title: "fall predicted, mm", key: "predicted_fall_mm", digits: 2 }, { title: "fall after the fit, mm", key: "refit_fall_mm", digits: 2 },
     { title: "skin left out, mm", key: "held_out_rms_mm", digits: 2 }, { title: "power", key: "power", digits: 2 },
     { title: "size [95 %]", key: "sizes", show: (list) => el("div", {}, list.map((line) => el("div", { class: "whole" }, line))) },
@@ -80,6 +80,16 @@
           "sign aside); a dot above 0.9. Refits go further than these slopes: \"not told apart\" in the table above is theirs." });
   };
 
+  // Sets of effects, most probable first, with what each leaves unexplained.
+  const hypotheses = (d) => {
+    if (!d.hypotheses) return "";
+    const rows = d.hypotheses.map((h) => ({ ...h, name: h.effects.length ? h.effects.map(words).join(" + ") : "nothing missing",
+      left: `${number(h.unexplained_mm, 1)} [${number(h.unexplained95[0], 1)}, ${number(h.unexplained95[1], 1)}]` }));
+    return supine.table_figure("hypotheses", "What may be missing", [{ title: "hypothesis", key: "name" },
+      { title: "probability", key: "probability", digits: 2 }, { title: "unexplained, mm [95 %]", key: "left" }], rows,
+    { caption: "The place of each scan, gravity, breath, springs, the gland, uneven tissue, skin and muscle are fitted in every one of them." });
+  };
+
   // A hint where no effect explains the rest.
   const forces = (file) => {
     const f = data.figures[file].missing_force;
@@ -91,10 +101,10 @@
     const file = supine.first_file("diagnosis.json", "ladder/diagnosis.json");
     if (!file) return section("candidates", "Which effect", gap("diagnose"));
     const d = data.figures[file], rows = rows_of(d);
-    return section("candidates", "Which effect", forces(file),
-      supine.table_figure("candidates", "Candidates, fitted ones first", columns.filter((c) => rows.some((r) => r[c.key] !== "" && r[c.key] !== null)), rows, {
+    return section("candidates", "Which effect", hypotheses(d), forces(file),
+      supine.table_figure("candidates", "Candidates, most probable first", columns.filter((c) => rows.some((r) => r[c.key] !== "" && r[c.key] !== null)), rows, {
         chosen: (row) => d.missing.includes(row.effect),
-        caption: "p: chance that errors alone score as high for any effect. Fall: by how much the RMS error shrinks, predicted by the linear score and found by the fit." }),
+        caption: "Probability: that the effect is missing, over all sets. p: chance that errors alone score as high for any effect. Fall: by how much the RMS error shrinks, predicted by the linear score and found by the fit." }),
       el("div", { class: "columns" },
         supine.figure("falls", "Error with the effect: ◇ predicted, ● after the fit", falls(d, rows), { rows, columns: columns.slice(0, 6) }),
         power(d), alike(d)), next_table(d));

@@ -2,23 +2,21 @@
 // The ladder: the error as effects are added, beside what noise leaves and what two controls reach.
 "use strict";
 (() => {
-  const { data, words, gap, section, p_value } = supine;
+  const { data, words, gap, section } = supine;
   const { text, line, ticks, scale, left_axis, marks, path, picture } = supine.svg;
   const series = [
     { key: "rms_mm", name: "fitted skin", mark: "dot", cls: "s1" },
     { key: "held_out_rms_mm", name: "skin left out", mark: "square", cls: "s2" },
-    { key: "pose", name: "pose left out", mark: "diamond", cls: "s3" },
+    { key: "unexplained_mm", name: "unexplained", mark: "diamond", cls: "s3" },
   ];
-  const with_pose = (figures) =>
-    figures && { ...figures, pose: Array.isArray(figures.held_out_pose_rms_mm) ? figures.held_out_pose_rms_mm[0] : null };
   const label = (rung, r) => (r === 0 ? "nothing added" : "+ " + words(rung.added));
 
   // One row per rung and control.
   const rows_of = (ladder) => {
     const row = (kind, name, r, f) => ({ rung: r, kind, name, mae_mm: f.mae_mm, rms_mm: f.rms_mm, held_out_rms_mm: f.held_out_rms_mm,
-      pose: f.pose, p_value: f.p_value === undefined ? null : f.p_value });
-    return ladder.rungs.map(with_pose).flatMap((rung, r) => {
-      const controls = rung.controls || {}, refit = with_pose(controls.refit_only), other = with_pose(controls.random_other);
+      unexplained_mm: f.unexplained_mm, probability: f.added && kind === "rung" ? f.probability : null });
+    return ladder.rungs.flatMap((rung, r) => {
+      const controls = rung.controls || {}, refit = controls.refit_only, other = controls.random_other;
       return [...(refit ? [row("control", "control: nothing added, fitted again", r, refit)] : []),
         ...(other && other.added ? [row("control", "control: + " + words(other.added) + " (drawn)", r, other)] : []),
         row("rung", label(rung, r), r, rung)];
@@ -55,8 +53,8 @@
     if (!file) return section("ladder", "The error, effect by effect", gap("ladder"));
     const ladder = data.figures[file], rows = rows_of(ladder);
     const columns = [{ title: "model", key: "name" }, { title: "MAE, mm", key: "mae_mm", digits: 2 }, { title: "RMS, mm", key: "rms_mm", digits: 2 },
-      { title: "skin left out, mm", key: "held_out_rms_mm", digits: 2 }, { title: "pose left out, mm", key: "pose", digits: 2 },
-      { title: "p of the next effect", key: "p_value", n: true, show: p_value }];
+      { title: "skin left out, mm", key: "held_out_rms_mm", digits: 2 }, { title: "unexplained, mm", key: "unexplained_mm", digits: 2 },
+      { title: "probability", key: "probability", digits: 2 }];
     return section("ladder", "The error, effect by effect",
       supine.figure("ladder", "Error of each rung, mm RMS", draw(ladder, rows), { columns, rows,
         caption: "Filled: the ladder. Hollow: controls at the same rung, left nothing added and everything fitted again, right an effect " +
