@@ -2,9 +2,11 @@
 #include "diagnosis/error_budget.h"
 
 #include <cmath>
+#include <set>
 
 #include "common/rms.h"
 #include "diagnosis/examine.h"
+#include "simulation/catalogue.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -25,20 +27,25 @@ double doubt_of(const Hypothesis& h, Wanted wanted) {
   return std::sqrt((columns * covariance).cwiseProduct(columns).sum() / static_cast<double>(columns.rows()));
 }
 
-bool is_of_measurement(const std::string& name) {
-  return name.find('/') != std::string::npos && name.find("stiffness") == std::string::npos &&
-         name.find("interface.") == std::string::npos && name.find("adhesion") == std::string::npos;
+/// Directions that stand for how and where was measured: scans, imaged skin, gravity, breath.
+std::set<std::string> of_measurement(const BaseFit& base) {
+  std::set<std::string> names;
+  for (const Nuisance& nuisance : base.nuisances)
+    if (!nuisance.pose.empty() || simulation::traits_of(nuisance.effect).kind == simulation::EffectKind::measurement)
+      names.insert(nuisance.name());
+  return names;
 }
 
 }  // namespace
 
 ErrorBudget error_budget(const Findings& found) {
   const Hypothesis& h = found.hypotheses.front();
+  const std::set<std::string> measured = of_measurement(found.base);
   ErrorBudget budget;
   budget.total = found.rms_mm;
   budget.noise = rms(found.base.noise_of_point_mm);
-  budget.registration = doubt_of(h, is_of_measurement);
-  budget.parameters = doubt_of(h, [](const std::string& name) { return !is_of_measurement(name); });
+  budget.registration = doubt_of(h, [&](const std::string& name) { return measured.contains(name); });
+  budget.parameters = doubt_of(h, [&](const std::string& name) { return !measured.contains(name); });
   if (found.base.numerical) budget.numerical = found.base.numerical->spread_mm;
   budget.patchiness = found.base.patchiness_mm;
   budget.model_form = found.unexplained.mean_mm;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "common/error.h"
 #include "phantom/random.h"
@@ -14,27 +13,9 @@ namespace {
 
 using simulation::Parameter;
 
-// Wider or narrower than the catalogue's, in the parameter's unit: what a nuisance becomes when it is an effect.
-struct Width {
-  const char *effect, *unit;
-  double sd;
-};
-constexpr double degree = std::numbers::pi / 180;
-constexpr Width widths[] = {{"misregistration", "mm", 10},
-                            {"misregistration", "rad", 8 * degree},
-                            {"gravity_tilt", "rad", 10 * degree},
-                            {"segmentation_offset", "mm", 1.5},
-                            {"incompressibility", "1", 1.5}};
-
-double spread(const std::string& effect, const Parameter& row) {
-  for (const Width& width : widths)
-    if (effect == width.effect && row.unit == width.unit) return width.sd;
-  return simulation::prior_sd(row);
-}
-
 // Log-normal where only positive values make sense, else normal.
-double drawn(const std::string& effect, const Parameter& row, Random& random) {
-  const double sd = spread(effect, row);
+double drawn(const Parameter& row, Random& random) {
+  const double sd = simulation::prior_sd(row);
   const bool positive = row.one_sided || row.lower > 0;
   for (;;) {
     const double z = random.normal();
@@ -71,7 +52,7 @@ Cause draw_cause_from_prior(const std::string& name, std::uint64_t seed) {
   if (effect == nullptr) throw InputError("the catalogue has no effect '" + name + "'");
   Random random(seed, "prior of " + name);
   Cause cause{.name = name, .by_catalogue = true};
-  for (const Parameter& row : effect->parameters()) cause.values[row.name] = drawn(name, row, random);
+  for (const Parameter& row : effect->parameters()) cause.values[row.name] = drawn(row, random);
   return cause;
 }
 

@@ -61,14 +61,14 @@ struct EffectTraits {
 
 /// How well things are known that no effect should be blamed for.
 struct MeasurementTolerances {
-  double registration_mm = 0.3;      ///< shift of each scan, 1 sigma in each direction
-  double registration_rad = 0.0036;  ///< turn of each scan: 0.3 mm at 83 mm
-  double gravity_rad = 0;            ///< direction of gravity in each pose but prone
+  double registration_mm = 2;        ///< shift of each scan, 1 sigma in each direction
+  double registration_rad = 0.0262;  ///< turn of each scan: 1.5°
+  double gravity_rad = 0.0349;       ///< direction of gravity in each pose but prone: 2°
   double segmentation_mm = 0.3;      ///< offset of the imaged skin: a fifth of a 1.5 mm voxel
   double chest_wall_mm = 1;          ///< the muscle between two scans: breath, and where its border was drawn
-  double incompressibility = 0.1;    ///< of a in ν = 0.5 - (0.5 - ν₀) e^{-a}: ν itself is assumed
-  double gland_log = 0;              ///< of the ln of the gland's stiffness over that of the rest
-  double spring_log = 0;             ///< of the ln of the springs' stiffness under muscle and cut: a factor of 2
+  double incompressibility = 0.3;    ///< of a in ν = 0.5 - (0.5 - ν₀) e^{-a}: ν itself is assumed
+  double gland_log = 0.3;            ///< of the ln of the gland's stiffness over that of the rest
+  double spring_log = 0.693;         ///< of the ln of the springs' stiffness under muscle and cut: a factor of 2
 };
 
 /// A catalogue entry: a few parameters that change fields of the mechanical terms.

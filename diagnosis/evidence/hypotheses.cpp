@@ -84,7 +84,7 @@ Screening::Screening(const BaseFit& base, const std::vector<Candidate>& candidat
     const Eigen::MatrixXd slope = base.clusters.means(candidate.slope);
     for (std::size_t k = 0; k < candidate.parameters.size(); ++k) {
       const CandidateParameter& p = candidate.parameters[k];
-      const StrengthPrior prior = strength_prior(candidate.effect, *simulation::find_parameter(p.name));
+      const StrengthPrior prior = strength_prior(*simulation::find_parameter(p.name));
       Eigen::VectorXd column = slope.col(static_cast<Eigen::Index>(k));
       if (candidate.secant.size() > 0) column = base.clusters.means(candidate.secant) / (prior.median - p.null);
       rows.push_back(static_cast<int>(all.size()));

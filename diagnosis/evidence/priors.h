@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <string>
 
 #include "diagnosis/evidence/patchiness.h"
 #include "simulation/effect.h"
@@ -13,7 +12,7 @@ namespace supine::diagnosis {
 struct Priors {
   /// Of sets of none, one, two and three effects; shared evenly by the sets of a size.
   std::array<double, 4> of_sets = {0.5, 0.3, 0.15, 0.05};
-  simulation::MeasurementTolerances known = known_by_default();  ///< nuisances, 1 sigma
+  simulation::MeasurementTolerances known = {};  ///< nuisances, 1 sigma
   Patchiness patchiness = {};
   double scan_shared_mm = 0.2, scan_shared_length_mm = 25;  ///< what neighbouring points of a scan err together
   /// What no effect explains is half-Cauchy with the scale max(least_unexplained_mm, share_of_way × rms way from the
@@ -21,8 +20,6 @@ struct Priors {
   double least_unexplained_mm = 0.3, share_of_way = 0.01, most_unexplained_mm = 10;
   double named_at = 0.95;             ///< inclusion probability from which an effect is named
   double unexplained_bound_mm = 0.5;  ///< above it what is left is told as a verdict
-
-  static simulation::MeasurementTolerances known_by_default();
 };
 
 /// The prior of one number of an effect: normal, or log-normal where only values above null make sense.
@@ -34,8 +31,6 @@ struct StrengthPrior {
   double sd() const;
 };
 
-/// The catalogue's, but for those that are nuisances made wider: place 10 mm and 8°, gravity 10°, imaged skin 1.5 mm,
-/// ln(0.5 − ν) 1.5.
-StrengthPrior strength_prior(const std::string& effect, const simulation::Parameter& row);
+StrengthPrior strength_prior(const simulation::Parameter& row);
 
 }  // namespace supine::diagnosis

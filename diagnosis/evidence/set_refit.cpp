@@ -103,7 +103,7 @@ simulation::EffectSetting free_setting(const std::string& name) {
   const simulation::Effect& effect = *simulation::find_effect(name);
   simulation::EffectSetting setting = simulation::null_setting(effect);
   for (const simulation::Parameter& row : effect.parameters()) {
-    const StrengthPrior prior = strength_prior(name, row);
+    const StrengthPrior prior = strength_prior(row);
     simulation::Setting& number = setting.parameters[row.name];
     number = {row.median, true, prior.spread, row.lower, row.upper};
     if (row.shape) number.prior_sd = simulation::prior_sd(row);

@@ -95,17 +95,27 @@ Json names_of(const Findings& found, const diagnosis::Hypothesis& h) {
   return names;
 }
 
+/// The most probable, and always "nothing", with what each leaves unexplained.
+std::vector<std::pair<const diagnosis::Hypothesis*, diagnosis::Unexplained>> told(const Findings& found) {
+  std::vector<std::pair<const diagnosis::Hypothesis*, diagnosis::Unexplained>> list;
+  bool nothing = false;
+  for (std::size_t h = 0; h < found.unexplained_by.size(); ++h) {
+    list.emplace_back(&found.hypotheses[h], found.unexplained_by[h]);
+    nothing = nothing || found.hypotheses[h].effects.empty();
+  }
+  for (const diagnosis::Hypothesis& h : found.hypotheses)
+    if (!nothing && h.effects.empty()) list.emplace_back(&h, found.left_by_base);
+  return list;
+}
+
 Json hypotheses_json(const Findings& found) {
   Json list = Json::array();
-  for (std::size_t h = 0; h < found.unexplained_by.size(); ++h) {
-    const diagnosis::Hypothesis& one = found.hypotheses[h];
-    const diagnosis::Unexplained& left = found.unexplained_by[h];
-    list.push_back({{"effects", names_of(found, one)},
-                    {"probability", one.probability},
-                    {"refitted", one.refitted},
+  for (const auto& [one, left] : told(found))
+    list.push_back({{"effects", names_of(found, *one)},
+                    {"probability", one->probability},
+                    {"refitted", one->refitted || one->effects.empty()},
                     {"unexplained_mm", left.mean_mm},
                     {"unexplained95", {left.low_mm, left.high_mm}}});
-  }
   return list;
 }
 
@@ -198,15 +208,13 @@ void say_places(const Run& run, const Findings& found) {
 
 void say_hypotheses(const Run& run, const Findings& found) {
   constexpr double worth_a_line = 0.01;
-  for (std::size_t h = 0; h < found.unexplained_by.size(); ++h) {
-    const diagnosis::Hypothesis& one = found.hypotheses[h];
-    if (one.probability < worth_a_line && h > 0) continue;
+  for (const auto& [one, left] : told(found)) {
+    if (one->probability < worth_a_line && !one->effects.empty()) continue;
     std::vector<std::string> names;
-    for (const int effect : one.effects) names.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);
+    for (const int effect : one->effects) names.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);
     const Refit* refit = names.empty() ? nullptr : found.refit_of(names);
-    const diagnosis::Unexplained& left = found.unexplained_by[h];
     run.say(fmt::format("  {:<34}{:>6.2f}      unexplained {:.1f} mm [{:.1f}, {:.1f}]     {}",
-                        names.empty() ? "nothing missing" : joined(names, " + "), one.probability, left.mean_mm,
+                        names.empty() ? "nothing missing" : joined(names, " + "), one->probability, left.mean_mm,
                         left.low_mm, left.high_mm, refit ? values_of(refit->parameters) : ""));
   }
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/effects/gravity_tilt.h"
 
+#include <numbers>
+
 #include "simulation/fields.h"
 
 namespace supine::simulation {
@@ -11,14 +13,14 @@ const std::vector<Parameter>& GravityTilt::parameters() const {
                                                .lower = -0.6,
                                                .upper = 0.6,
                                                .median = 0,
-                                               .spread = 0.15,
+                                               .spread = 10 * std::numbers::pi / 180,
                                                .meaning = "rotation about the head axis (+z LPS)"},
                                               {.name = "pitch_rad",
                                                .unit = "rad",
                                                .lower = -0.6,
                                                .upper = 0.6,
                                                .median = 0,
-                                               .spread = 0.15,
+                                               .spread = 10 * std::numbers::pi / 180,
                                                .meaning = "rotation about the left axis (+x LPS)"}};
   return rows;
 }

@@ -11,7 +11,7 @@ const std::vector<Parameter>& Incompressibility::parameters() const {
                                                .lower = -0.7,
                                                .upper = 4,
                                                .median = 0,
-                                               .spread = 0.5,
+                                               .spread = 1.5,
                                                .meaning = "a of 0.5 - nu becoming (0.5 - nu) e^-a"}};
   return rows;
 }

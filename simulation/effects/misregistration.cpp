@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/effects/misregistration.h"
 
+#include <numbers>
+
 #include "simulation/fields.h"
 
 namespace supine::simulation {
@@ -11,42 +13,42 @@ const std::vector<Parameter>& Misregistration::parameters() const {
                                                .lower = -25,
                                                .upper = 25,
                                                .median = 0,
-                                               .spread = 3,
+                                               .spread = 10,
                                                .meaning = "scan given too far to the patient's left (+x LPS)"},
                                               {.name = "shift_y_mm",
                                                .unit = "mm",
                                                .lower = -25,
                                                .upper = 25,
                                                .median = 0,
-                                               .spread = 3,
+                                               .spread = 10,
                                                .meaning = "scan given too far to the back (+y LPS)"},
                                               {.name = "shift_z_mm",
                                                .unit = "mm",
                                                .lower = -25,
                                                .upper = 25,
                                                .median = 0,
-                                               .spread = 3,
+                                               .spread = 10,
                                                .meaning = "scan given too far to the head (+z LPS)"},
                                               {.name = "turn_x_rad",
                                                .unit = "rad",
                                                .lower = -0.3,
                                                .upper = 0.3,
                                                .median = 0,
-                                               .spread = 0.05,
+                                               .spread = 8 * std::numbers::pi / 180,
                                                .meaning = "scan given turned about +x, through its centroid"},
                                               {.name = "turn_y_rad",
                                                .unit = "rad",
                                                .lower = -0.3,
                                                .upper = 0.3,
                                                .median = 0,
-                                               .spread = 0.05,
+                                               .spread = 8 * std::numbers::pi / 180,
                                                .meaning = "scan given turned about +y, through its centroid"},
                                               {.name = "turn_z_rad",
                                                .unit = "rad",
                                                .lower = -0.3,
                                                .upper = 0.3,
                                                .median = 0,
-                                               .spread = 0.05,
+                                               .spread = 8 * std::numbers::pi / 180,
                                                .meaning = "scan given turned about +z, through its centroid"}};
   return rows;
 }

@@ -11,7 +11,7 @@ const std::vector<Parameter>& SegmentationOffset::parameters() const {
                                                .lower = -3,
                                                .upper = 3,
                                                .median = 0,
-                                               .spread = 0.5,
+                                               .spread = 1.5,
                                                .meaning = "how far outside the imaged skin the true one lies"}};
   return rows;
 }

@@ -35,7 +35,7 @@ struct Solved {
 TEST(Nuisances, ShapesAreTheSlopesOfTheModelThatCarriesThem) {
   Solved solved;
   const std::vector<std::string> poses = {"prone", "supine"};
-  simulation::MeasurementTolerances known = Priors::known_by_default();
+  simulation::MeasurementTolerances known = simulation::MeasurementTolerances{};
   std::vector<Nuisance> all = nuisances_of(solved.model, poses, known);
   find_shapes(solved.evaluator, solved.sensitivities, solved.model, solved.prediction, solved.residuals, all);
   for (const char* name :
@@ -60,7 +60,7 @@ TEST(Nuisances, WhatTheModelFitsOrHasAsAnEffectIsNotThereTwice) {
   simulation::Model model = supine::testing::twin_truth();
   const auto names_of = [&model] {
     std::vector<std::string> names;
-    for (const Nuisance& n : nuisances_of(model, {"prone", "supine"}, Priors::known_by_default()))
+    for (const Nuisance& n : nuisances_of(model, {"prone", "supine"}, simulation::MeasurementTolerances{}))
       names.push_back(n.name());
     return names;
   };
