@@ -86,6 +86,18 @@ std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParamet
   return list;
 }
 
+/// Distances of the points with all numbers where the likeliest size of the discrepancy has them, to first order: the
+/// chain was solved with nuisances where the base fit has them.
+VectorXd distances_at_posterior(const BaseFit& base, const Hypothesis& h, const calibration::Residuals& residuals) {
+  Index likeliest;
+  h.weighed.size_probability.maxCoeff(&likeliest);
+  const VectorXd change =
+      h.evidence->directions().columns(Eigen::all, h.rows) * h.weighed.mean[static_cast<std::size_t>(likeliest)];
+  VectorXd distance = residuals.distance_mm;
+  for (Index r = 0; r < distance.size(); ++r) distance[r] += change[base.clusters.of_point[r]];
+  return distance;
+}
+
 bool is_at_border(const Refit& refit, const FreeParameters& parameters) {
   constexpr double close = 0.01;  // of the range
   for (Index i = 0; i < parameters.size(); ++i) {
@@ -150,7 +162,7 @@ Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& gi
   result.model = FreeParameters(model).model(result.fit.u);
   result.parameters = parameters_of(result, parameters);
   result.at_border = is_at_border(result, parameters);
-  result.rms_mm = rms(result.fit.residuals.distance_mm);
+  result.rms_mm = rms(distances_at_posterior(base, h, result.fit.residuals));
   result.held_out_rms_mm = held_out_rms(base, h, result.fit.residuals);
   return result;
 }

@@ -93,8 +93,11 @@ std::string stale(const std::string& sidecar, const Json& figures, const Places&
     fs::path there = fs::exists(beside) ? beside : places.out / name;
     if (name == "model.toml")
       there = (lies_in_case(name, made.value("tool", "")) ? places.case_folder : places.out) / name;
-    if (fs::exists(there) && sha256(there) != input.value("sha256", ""))
-      return fmt::format("{} was made from another {}", sidecar, name);
+    // A diagnosis reads two of this name: the calibrated one, and the case's own for its priors.
+    const fs::path given = places.case_folder / "model.toml";
+    const std::string hash = input.value("sha256", "");
+    if (name == "model.toml" && fs::exists(given) && sha256(given) == hash) continue;
+    if (fs::exists(there) && sha256(there) != hash) return fmt::format("{} was made from another {}", sidecar, name);
   }
   return {};
 }

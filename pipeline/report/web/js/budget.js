@@ -3,8 +3,8 @@
 "use strict";
 (() => {
   const { data, gap, section } = supine;
-  const parts = [["noise", "scan noise", "s5"], ["registration", "place of scan, imaged skin, gravity, breath", "s3"], ["numerical", "mesh", "s4"],
-    ["parameters", "moduli, springs, gland", "s6"], ["patchiness", "uneven tissue, skin, muscle", "s6"],
+  const parts = [["noise", "scan noise", "s5"], ["registration", "how it was measured", "s3"], ["numerical", "mesh", "s4"],
+    ["parameters", "moduli, springs, gland", "s6"], ["patchiness", "uneven tissue and skin", "s6"],
     ["model_form", "what no effect explains", "s2"], ["total", "whole error, RMS", "s1"]];
 
   supine.budget = () => {
