@@ -27,12 +27,11 @@ double typical_size(const Parameter& row) {
 }  // namespace
 
 std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const simulation::Model& model,
-                                       const calibration::Fit& fit, std::vector<std::string>& unseen,
-                                       const std::function<bool(const std::string& effect)>& wanted) {
+                                       const calibration::Fit& fit, std::vector<std::string>& unseen) {
   const simulation::Sensitivities sensitivities(evaluator.chain(), model, fit.prediction.solution);
   std::vector<Candidate> candidates;
   for (const Effect* effect : simulation::catalogue()) {
-    if (has(model, *effect) || (wanted && !wanted(effect->name()))) continue;
+    if (has(model, *effect)) continue;
     Candidate candidate{effect->name(), {}, Eigen::MatrixXd(fit.residuals.size(), 0), {}};
     for (const Parameter& row : effect->parameters()) {
       if (row.shape) continue;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -30,9 +29,7 @@ struct Candidate {
 /// Every effect of the catalogue that is not in the model and that the fitted points can feel. Parameters that change
 /// nothing at the null are left out: place and shape (Parameter::shape), and what these points do not feel.
 /// @param unseen  out: effects of the catalogue that move no fitted point, here or anywhere
-/// @param wanted  which effects to look at; empty = all
 std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const simulation::Model& model,
-                                       const calibration::Fit& fit, std::vector<std::string>& unseen,
-                                       const std::function<bool(const std::string& effect)>& wanted = {});
+                                       const calibration::Fit& fit, std::vector<std::string>& unseen);
 
 }  // namespace supine::diagnosis

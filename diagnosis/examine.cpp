@@ -188,6 +188,22 @@ std::vector<ScanPlace> find_places(const Subject& subject, const Findings& found
 
 }  // namespace
 
+const Inclusion& Findings::included_of(const std::string& effect) const {
+  return *std::find_if(included.begin(), included.end(),
+                       [&effect](const Inclusion& one) { return one.effect == effect; });
+}
+
+std::vector<std::pair<const Hypothesis*, Unexplained>> Findings::told() const {
+  std::vector<std::pair<const Hypothesis*, Unexplained>> list;
+  bool nothing = false;
+  for (std::size_t h = 0; h < unexplained_by.size(); ++h) {
+    list.emplace_back(&hypotheses[h], unexplained_by[h]);
+    nothing = nothing || hypotheses[h].effects.empty();
+  }
+  if (!nothing) list.emplace_back(&nothing_of(*this), left_by_base);
+  return list;
+}
+
 std::vector<std::string> Findings::effects() const {
   std::vector<std::string> names;
   for (const Candidate& candidate : candidates) names.push_back(candidate.effect);

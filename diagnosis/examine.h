@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/diagnose.h"
@@ -68,6 +69,9 @@ struct Findings {
   Findings(const Findings&) = delete;
   Findings& operator=(const Findings&) = delete;
 
+  const Inclusion& included_of(const std::string& effect) const;  ///< @pre  a candidate
+  /// The most probable, and always "nothing", with what each leaves unexplained.
+  std::vector<std::pair<const Hypothesis*, Unexplained>> told() const;
   std::vector<std::string> effects() const;                              ///< of the candidates
   const Refit* refit_of(const std::vector<std::string>& effects) const;  ///< of that set; nullptr where there is none
 };

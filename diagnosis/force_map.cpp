@@ -6,8 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "common/error.h"
-#include "simulation/solve/linear_solver.h"
+#include "diagnosis/evidence/field_modes.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -18,26 +17,11 @@ using Eigen::VectorXd;
 
 constexpr int most_centres = 60;
 
-/// Points that lie as far from each other as they can, from the first one on; @p spacing: the last gap.
-std::vector<int> spread_out(const Points& points, int most, double& spacing) {
-  std::vector<int> chosen{0};
-  VectorXd gap = (points.rowwise() - points.row(0)).rowwise().norm();
-  while (static_cast<int>(chosen.size()) < most) {
-    Index next;
-    spacing = gap.maxCoeff(&next);
-    if (!(spacing > 0)) break;
-    chosen.push_back(static_cast<int>(next));
-    gap = gap.cwiseMin((points.rowwise() - points.row(next)).rowwise().norm());
-  }
-  return chosen;
-}
-
-/// Gaussian bumps, #points by #centres.
-MatrixXd bumps(const Points& points, const Points& centres, double width) {
-  MatrixXd weight(points.rows(), centres.rows());
-  for (Index c = 0; c < centres.rows(); ++c)
-    weight.col(c) = (-(points.rowwise() - centres.row(c)).rowwise().squaredNorm().array() / (2 * width * width)).exp();
-  return weight;
+/// Distance of the last centre, which is the nearest to another, from the rest; 1 where there is no other.
+double spacing_of(const Points& centres) {
+  const Index rest = centres.rows() - 1;
+  if (rest < 1) return 1;
+  return (centres.topRows(rest).rowwise() - centres.row(rest)).rowwise().norm().minCoeff();
 }
 
 /// A third of the deformed area of the skin's triangles about each mesh point.
@@ -51,59 +35,23 @@ VectorXd node_areas(const calibration::ModelSkin& skin, const Points& x) {
   return area;
 }
 
-/// Moves of the nodes of one pose under unit bumps: solves with its tangent.
-class PoseTangent {
- public:
-  PoseTangent(const calibration::MeasuredScene& scene, const simulation::Model& model, const calibration::Fit& fit,
-              std::size_t pose, simulation::Chain& chain)
-      : mechanics_(*scene.mesh, *scene.anatomy, model), sums_(mechanics_.pattern()) {
-    const auto& solution = fit.prediction.solution;
-    mechanics_.set_fields(simulation::values_of(chain.fields(model, scene.measurements[pose]->pose)));
-    mechanics_.evaluate({solution.poses[pose].x, solution.X, 1.0}, {.residual = true, .tangent = true}, sums_);
-    if (mechanics_.has_energy()) {
-      cholesky_ = std::make_unique<simulation::CholeskySolver>(sums_.tangent);
-      if (cholesky_->factorise(sums_.tangent)) return;
-      cholesky_.reset();
-    }
-    lu_ = std::make_unique<simulation::LuSolver>(sums_.tangent);
-    if (!lu_->factorise(sums_.tangent)) throw NumericalFailure("the tangent is singular: no map of missing forces");
-  }
-
-  /// @param force  3 per node, mN
-  Points move(const VectorXd& force) const {
-    const VectorXd dx = cholesky_ ? cholesky_->solve(force) : lu_->solve(force);
-    return Eigen::Map<const Points>(dx.data(), dx.size() / 3, 3);
-  }
-
- private:
-  simulation::Mechanics mechanics_;
-  simulation::Sums sums_;
-  std::unique_ptr<simulation::CholeskySolver> cholesky_;
-  std::unique_ptr<simulation::LuSolver> lu_;
-};
-
-/// ∂d/∂a of every bump and axis, #R by 3 #centres; a parameter that moves neither scan nor image lends its name.
+/// ∂d/∂a of every bump and axis, #R by 3 #centres, mm per kPa.
 MatrixXd slopes(const calibration::MeasuredScene& scene, const simulation::Model& model, const calibration::Fit& fit,
                 const Points& centres, double width, std::size_t pose) {
-  const std::string lender = "breast.young_modulus_kpa";
   calibration::Evaluator evaluator(scene, model);
-  const PoseTangent tangent(scene, model, fit, pose, evaluator.chain());
-  const auto& solution = fit.prediction.solution;
-  const Points& x = solution.poses[pose].x;
+  const simulation::Sensitivities sensitivities(evaluator.chain(), model, fit.prediction.solution);
+  const Points& x = fit.prediction.solution.poses[pose].x;
   const calibration::ModelSkin skin(*scene.mesh, x);
   const VectorXd area = node_areas(skin, x);
-  const MatrixXd weight = bumps(x, centres, width);
-  simulation::ChainDerivative derivative;
-  derivative.prone = derivative.X = Points::Zero(x.rows(), 3);
-  derivative.poses.assign(solution.poses.size(), Points::Zero(x.rows(), 3));
+  const MatrixXd weight = gaussian_kernel(x, centres, width);
+  std::vector<Points> moves(fit.prediction.poses.size());
   MatrixXd columns(fit.residuals.size(), 3 * centres.rows());
   for (Index c = 0; c < centres.rows(); ++c)
     for (int axis = 0; axis < 3; ++axis) {
       VectorXd force = VectorXd::Zero(x.size());
       for (const int node : skin.nodes()) force[3 * node + axis] = area[node] * weight(node, c);
-      derivative.poses[pose] = tangent.move(force);
-      columns.col(3 * c + axis) =
-          calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, lender, derivative);
+      moves[pose] = sensitivities.moved_by(pose, force);
+      columns.col(3 * c + axis) = calibration::distance_change(fit.prediction, fit.residuals, moves);
     }
   return columns;
 }
@@ -154,14 +102,14 @@ ForceMap force_map(const calibration::MeasuredScene& scene, const simulation::Mo
                    const Metric& metric, unsigned seed, int draws) {
   const calibration::ModelSkin skin(*scene.mesh, f.prediction.solution.poses[0].x);
   const Points nodes = skin.node_points();
-  double width = 1;
-  const Points centres = nodes(spread_out(nodes, most_centres, width), Eigen::all);
+  const Points centres = nodes(spread_out(nodes, most_centres), Eigen::all);
+  const double width = spacing_of(centres);
   const MatrixXd absorbed = metric.whitening->apply(f.linearisation.slope);
   const auto solver = absorbed.completeOrthogonalDecomposition();
   const auto freed = [&](const MatrixXd& a) -> MatrixXd { return a - absorbed * solver.solve(a); };
   const Evidence evidence(freed(metric.whitening->apply(slopes(scene, model, f, centres, width, 0))));
   const VectorXd d = freed(metric.whitening->apply(f.residuals.distance_mm + metric.mean_mm));
-  const MatrixXd weight = bumps(f.residuals.place, centres, width);
+  const MatrixXd weight = gaussian_kernel(f.residuals.place, centres, width);
   ForceMap map;
   std::tie(map.evidence_gain, map.amplitude_kpa) = evidence.best(d);
   map.force_kpa = field(weight, evidence.coefficients(d, map.amplitude_kpa));

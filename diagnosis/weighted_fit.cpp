@@ -118,10 +118,6 @@ WeightedFit weigh(Evaluator& evaluator, const FreeParameters& parameters, const 
   return result;
 }
 
-void weigh_again(const FreeParameters& parameters, const Metric& metric, WeightedFit& fit) {
-  evaluate(parameters, metric, fit);
-}
-
 void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
              const DescentOptions& options, WeightedFit& fit) {
   double damping = Damping::first;
@@ -153,16 +149,6 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metri
     damping = std::max(Damping::after_failure * damping, Damping::least_after_failure);
     if (damping > Damping::given_up) return;
   }
-}
-
-double misfit_of(const WeightedFit& fit, const FreeParameters& parameters, const Metric& metric) {
-  const auto rows = metric.whitening->apply(fit.solution.residuals.distance_mm).size();
-  return fit.data / static_cast<double>(std::max<Eigen::Index>(1, rows - parameters.size()));
-}
-
-Eigen::MatrixXd information(const WeightedFit& fit, const FreeParameters& parameters, const Metric& metric) {
-  const Rows rows = rows_of(fit.solution, parameters, metric);
-  return rows.slope.transpose() * rows.slope;
 }
 
 }  // namespace supine::diagnosis

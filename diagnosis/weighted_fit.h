@@ -35,19 +35,9 @@ simulation::SolveOptions accurate_enough();
 WeightedFit weigh(calibration::Evaluator& evaluator, const calibration::FreeParameters& parameters,
                   const Metric& metric, const Eigen::VectorXd& u, const simulation::ChainSolution* near);
 
-/// F of a fit in another metric for the same points. @pre  metric.mask is that of the fit
-void weigh_again(const calibration::FreeParameters& parameters, const Metric& metric, WeightedFit& fit);
-
 /// Levenberg-Marquardt with exact sensitivities inside the parameters' ranges: coordinates at an end that pull further
 /// out are held. A step without equilibrium is shortened. Points are those of the metric throughout.
 void descend(calibration::Evaluator& evaluator, const calibration::FreeParameters& parameters, const Metric& metric,
              const DescentOptions& options, WeightedFit& fit);
-
-/// Data part of F per degree of freedom: 1 is what errors alone leave.
-double misfit_of(const WeightedFit& fit, const calibration::FreeParameters& parameters, const Metric& metric);
-
-/// Information of the coordinates, JᵀΣ⁻¹J and the priors'.
-Eigen::MatrixXd information(const WeightedFit& fit, const calibration::FreeParameters& parameters,
-                            const Metric& metric);
 
 }  // namespace supine::diagnosis

@@ -144,26 +144,17 @@ class Fitter {
   std::unique_ptr<simulation::Sensitivities> linearise() {
     auto sensitivities =
         std::make_unique<simulation::Sensitivities>(evaluator_.chain(), base_.model, base_.fit.prediction.solution);
-    const Residuals& residuals = base_.fit.residuals;
-    MatrixXd& slope = base_.fit.linearisation.slope;
-    const VectorXd unit = base_.parameters->slope(base_.fit.u);
-    slope.resize(residuals.size(), unit.size());
-    base_.fit.linearisation.by_coordinate.clear();
-    for (Index i = 0; i < unit.size(); ++i) {
-      const std::string& name = base_.parameters->names()[static_cast<std::size_t>(i)];
-      simulation::ChainDerivative derivative = sensitivities->of(name);
-      slope.col(i) = unit[i] * slope_at(evaluator_, base_.model, base_.fit.prediction, residuals, name, derivative);
-      derivative.X *= unit[i], derivative.prone *= unit[i];
-      for (Points& x : derivative.poses) x *= unit[i];
-      base_.fit.linearisation.by_coordinate.push_back(std::move(derivative));
-    }
-    find_shapes(evaluator_, *sensitivities, base_.model, base_.fit.prediction, residuals, base_.nuisances);
+    const FreeParameters there(with_nuisances(base_.parameters->base(), base_.nuisances, poses_));
+    base_.fit.linearisation = calibration::linearise(evaluator_, *sensitivities, there, base_.fit.u,
+                                                     base_.fit.prediction, base_.fit.residuals);
+    find_shapes(evaluator_, *sensitivities, base_.model, base_.fit.prediction, base_.fit.residuals, base_.nuisances);
     return sensitivities;
   }
 
   /// One step of Gauss and Newton, shortened until F falls. @return  whether it did by more than a little
   bool improve() {
-    const LinearEvidence evidence(*base_.covariance, base_.distances(base_.fit.residuals), base_directions(base_));
+    const LinearEvidence evidence(*base_.covariance, base_.distances(base_.fit.residuals),
+                                  directions_at(base_.fit, *base_.parameters, base_.nuisances, base_.clusters));
     std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
     for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<int>(k);
     const Weighed weighed = evidence.weigh(all);
@@ -225,18 +216,21 @@ VectorXd coordinates_of(const FreeParameters& parameters, const simulation::Mode
 
 }  // namespace
 
-Directions base_directions(const BaseFit& base) {
+Directions directions_at(const calibration::Fit& fit, const FreeParameters& parameters,
+                         const std::vector<Nuisance>& nuisances, const calibration::Clusters& clusters) {
+  constexpr double open = 3;  // coordinates: nothing is believed of it
   Directions all;
-  const MatrixXd slopes = base.clusters.means(base.fit.linearisation.slope);
-  for (Index i = 0; i < slopes.cols(); ++i) {
-    constexpr double open = 3;  // coordinates: nothing is believed of it
-    const auto& prior = base.parameters->priors()[static_cast<std::size_t>(i)];
-    all.add(base.parameters->names()[static_cast<std::size_t>(i)], slopes.col(i),
-            prior ? prior->mean - base.fit.u[i] : 0, prior ? prior->sd : open);
+  const MatrixXd slope = clusters.means(fit.linearisation.slope);
+  const VectorXd unit = parameters.slope(fit.u);
+  for (Index i = 0; i < slope.cols(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const auto& prior = parameters.priors()[k];
+    all.add(parameters.names()[k], slope.col(i), prior ? prior->mean - fit.u[i] : 0, prior ? prior->sd : open,
+            parameters.value(i, fit.u[i]), unit[i]);
   }
-  for (const Nuisance& nuisance : base.nuisances)
-    all.add(nuisance.name(), base.clusters.means(nuisance.shape_mm), -nuisance.value, 1,
-            nuisance.value * nuisance.sigma, nuisance.sigma);
+  for (const Nuisance& nuisance : nuisances)
+    all.add(nuisance.name(), clusters.means(nuisance.shape_mm), -nuisance.value, 1, nuisance.value * nuisance.sigma,
+            nuisance.sigma);
   return all;
 }
 

@@ -43,8 +43,10 @@ struct BaseFit {
   double size_of(const Weighed& weighed) const;
 };
 
-/// What distances depend on in every hypothesis, moduli first, then nuisances, as offsets from where they stand.
-Directions base_directions(const BaseFit& base);
+/// What distances depend on at a fit, as offsets from where they stand: its free parameters with their priors, then
+/// nuisances; over the clusters.
+Directions directions_at(const calibration::Fit& fit, const calibration::FreeParameters& parameters,
+                         const std::vector<Nuisance>& nuisances, const calibration::Clusters& clusters);
 
 struct BaseFitOptions {
   Priors priors;

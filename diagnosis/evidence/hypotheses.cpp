@@ -74,7 +74,7 @@ double inclusion(const std::vector<Hypothesis>& hypotheses, int effect) {
 
 Screening::Screening(const BaseFit& base, const std::vector<Candidate>& candidates, const Priors& priors)
     : priors_(priors), count_(candidates.size()) {
-  Directions all = base_directions(base);
+  Directions all = directions_at(base.fit, *base.parameters, base.nuisances, base.clusters);
   base_rows_.resize(static_cast<std::size_t>(all.size()));
   std::iota(base_rows_.begin(), base_rows_.end(), 0);
   for (const Candidate& candidate : candidates) {

@@ -3,7 +3,6 @@
 
 #include "diagnosis/evidence/field_modes.h"
 #include "meshing/topology.h"
-#include "simulation/mechanics.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -52,13 +51,16 @@ Eigen::MatrixXd muscle_fields(const meshing::Anatomy& anatomy, const simulation:
 
 }  // namespace
 
+PatchyFields patchy_fields(const simulation::Mechanics& mechanics, const Patchiness& size) {
+  return {tissue_fields(mechanics.mesh(), size), skin_fields(mechanics.mesh(), mechanics.layout(), size),
+          muscle_fields(mechanics.anatomy(), mechanics.layout(), size)};
+}
+
 Eigen::MatrixXd patchiness_shapes(const simulation::Chain& chain, const simulation::Sensitivities& sensitivities,
                                   const calibration::Prediction& prediction, const calibration::Residuals& residuals,
                                   const Patchiness& size) {
-  const simulation::Mechanics& mechanics = chain.mechanics();
-  const Eigen::MatrixXd tissue = tissue_fields(mechanics.mesh(), size);
-  const Eigen::MatrixXd skin = skin_fields(mechanics.mesh(), mechanics.layout(), size);
-  const Eigen::MatrixXd muscle = muscle_fields(mechanics.anatomy(), mechanics.layout(), size);
+  const PatchyFields fields = patchy_fields(chain.mechanics(), size);
+  const Eigen::MatrixXd &tissue = fields.tissue, &skin = fields.skin, &muscle = fields.muscle;
   Eigen::MatrixXd shapes(residuals.size(), tissue.cols() + skin.cols() + muscle.cols());
   Eigen::Index column = 0;
   const auto add = [&](const simulation::Sensitivities::FieldDirection& direction) {

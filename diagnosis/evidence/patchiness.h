@@ -3,6 +3,7 @@
 
 #include "calibration/evaluator.h"
 #include "calibration/residuals.h"
+#include "simulation/mechanics.h"
 
 namespace supine::diagnosis {
 
@@ -13,9 +14,18 @@ struct Patchiness {
   double muscle_mm = 0.7, muscle_length_mm = 30;  ///< of the muscle's place in every pose but the imaged one
 };
 
+/// The shapes of the three fields, one standard deviation each. What the modulus of the tissue, that of the skin and a
+/// hill under the mound can make up for is taken out of them.
+struct PatchyFields {
+  Eigen::MatrixXd tissue;  ///< #cells by up to 40, of ln E
+  Eigen::MatrixXd skin;    ///< #skin faces by up to 40, of the ln of the stiffness
+  Eigen::MatrixXd muscle;  ///< #interface points by up to 40, mm along the muscle's normal
+};
+
+PatchyFields patchy_fields(const simulation::Mechanics& mechanics, const Patchiness& patchiness);
+
 /// What uneven tissue, uneven skin and a muscle that lies elsewhere do to the distances, to first order: one column per
-/// shape of each field (field_modes.h), #R by 3 × up to 40, mm, each one standard deviation. What the modulus of the
-/// tissue, that of the skin and a hill under the mound can make up for is taken out of the fields.
+/// shape of each field (field_modes.h), #R by 3 × up to 40, mm, each one standard deviation.
 /// @param sensitivities  of the prediction's solution by @p chain
 Eigen::MatrixXd patchiness_shapes(const simulation::Chain& chain, const simulation::Sensitivities& sensitivities,
                                   const calibration::Prediction& prediction, const calibration::Residuals& residuals,

@@ -53,23 +53,6 @@ VectorXd start_of(const FreeParameters& parameters, const BaseFit& base, const s
   return parameters.clamped(u);
 }
 
-Directions directions_at(const calibration::Fit& fit, const FreeParameters& parameters,
-                         const std::vector<Nuisance>& nuisances, const calibration::Clusters& clusters) {
-  constexpr double open = 3;  // coordinates: nothing is believed of it
-  Directions all;
-  const Eigen::MatrixXd slope = clusters.means(fit.linearisation.slope);
-  const VectorXd unit = parameters.slope(fit.u);
-  for (Index i = 0; i < slope.cols(); ++i) {
-    const auto& prior = parameters.priors()[static_cast<std::size_t>(i)];
-    all.add(parameters.names()[static_cast<std::size_t>(i)], slope.col(i), prior ? prior->mean - fit.u[i] : 0,
-            prior ? prior->sd : open, parameters.value(i, fit.u[i]), unit[i]);
-  }
-  for (const Nuisance& nuisance : nuisances)
-    all.add(nuisance.name(), clusters.means(nuisance.shape_mm), -nuisance.value, 1, nuisance.value * nuisance.sigma,
-            nuisance.sigma);
-  return all;
-}
-
 std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParameters& parameters) {
   std::vector<FittedParameter> list;
   for (Index i = 0; i < parameters.size(); ++i) {

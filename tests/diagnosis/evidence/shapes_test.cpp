@@ -98,7 +98,29 @@ TEST(Sensitivities, ForcesOnNodesMoveWhatTheTangentSays) {
   for (Eigen::Index n = 0; n < x.rows(); ++n) weight[3 * n + 1] = 1;
   const Points moved = solved.sensitivities.moved_by(0, weight);
   EXPECT_GT(moved.col(1).mean(), 0) << "with the force";
-  EXPECT_LT((solved.sensitivities.moved_by(0, 2 * weight) - 2 * moved).norm(), 1e-9 * moved.norm());
+  simulation::Mechanics mechanics(solved.twin.mesh, solved.twin.anatomy, solved.model);
+  mechanics.set_fields(simulation::values_of(solved.evaluator.chain().fields(solved.model, solved.twin.supine)));
+  simulation::Sums sums(mechanics.pattern());
+  const simulation::State state{x, solved.prediction.solution.X, 1.0};
+  mechanics.evaluate(state, {.residual = true, .tangent = true}, sums);
+  const Eigen::VectorXd back = sums.tangent * Eigen::Map<const Eigen::VectorXd>(moved.data(), moved.size());
+  EXPECT_LT((back - weight).norm(), 1e-6 * weight.norm());
+}
+
+TEST(Patchiness, FieldsHaveTheSizesTheyAreGiven) {
+  Solved solved;
+  Patchiness size;
+  size.tissue_length_mm = size.skin_length_mm = size.muscle_length_mm = 30;  // few shapes hold nearly all of a field
+  const PatchyFields fields = patchy_fields(solved.evaluator.chain().mechanics(), size);
+  const auto sd = [](const Eigen::MatrixXd& shapes) {
+    return std::sqrt(shapes.squaredNorm() / static_cast<double>(shapes.rows()));
+  };
+  // What is taken out of them makes them smaller than they are given.
+  for (const auto& [found, given] : {std::pair{sd(fields.tissue), size.tissue}, std::pair{sd(fields.skin), size.skin},
+                                     std::pair{sd(fields.muscle), size.muscle_mm}}) {
+    EXPECT_LT(found, 1.05 * given);
+    EXPECT_GT(found, 0.7 * given);
+  }
 }
 
 TEST(Patchiness, ShapesLeaveOutWhatTheModuliMakeUpForAndGrowWithTheirSize) {

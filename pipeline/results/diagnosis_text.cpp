@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/results/diagnosis_report.h"
+
+namespace supine::pipeline {
+namespace {
+
+using diagnosis::Findings;
+using diagnosis::Refit;
+using diagnosis::Verdict;
+
+std::string values_of(const std::vector<diagnosis::FittedParameter>& parameters) {
+  std::string text;
+  for (const auto& p : parameters) {
+    const std::string unit = p.unit == "1" ? "" : " " + p.unit;
+    text += fmt::format("{}{} {:.2g} [{:.2g}, {:.2g}]{}", text.empty() ? "" : ", ", p.name.substr(p.name.find('.') + 1),
+                        p.value, p.low, p.high, unit);
+  }
+  return text;
+}
+
+std::string joined(const std::vector<std::string>& names, const char* between) {
+  return fmt::format("{}", fmt::join(names, between));
+}
+
+void say_places(const Run& run, const Findings& found) {
+  for (const diagnosis::ScanPlace& place : found.places)
+    run.say(fmt::format("  the {} scan lies {:.1f} ± {:.1f} mm and {:.1f} ± {:.1f}° from where it was said to lie",
+                        place.pose, place.shift_mm.norm(), place.sd.head<3>().norm() / std::sqrt(3.0),
+                        place.turn_deg.norm(), place.sd.tail<3>().norm() / std::sqrt(3.0)));
+}
+
+void say_hypotheses(const Run& run, const Findings& found) {
+  constexpr double worth_a_line = 0.01;
+  for (const auto& [one, left] : found.told()) {
+    if (one->probability < worth_a_line && !one->effects.empty()) continue;
+    std::vector<std::string> names;
+    for (const int effect : one->effects) names.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);
+    const Refit* refit = names.empty() ? nullptr : found.refit_of(names);
+    run.say(fmt::format("  {:<34}{:>6.2f}      unexplained {:.1f} mm [{:.1f}, {:.1f}]     {}",
+                        names.empty() ? "nothing missing" : joined(names, " + "), one->probability, left.mean_mm,
+                        left.low_mm, left.high_mm, refit ? values_of(refit->parameters) : ""));
+  }
+}
+
+std::string where(const std::vector<diagnosis::HotSpot>& spots) {
+  constexpr std::size_t most = 4;
+  std::string text;
+  for (std::size_t s = 0; s < std::min(most, spots.size()); ++s)
+    text += fmt::format("{}{} {:+.1f} mm ({:.0f} cm²)", s > 0 ? ", " : "", spots[s].area, spots[s].mean_signed_mm,
+                        spots[s].area_cm2);
+  return text.empty() ? "nowhere by more than noise" : text;
+}
+
+/// "ligament (0.98) and adhesion (0.96)".
+std::string with_probabilities(const Findings& found) {
+  std::vector<std::string> named;
+  for (const std::string& name : found.diagnosis.missing)
+    named.push_back(fmt::format("{} ({:.2f})", name, found.included_of(name).probability));
+  return joined(named, found.diagnosis.verdict == Verdict::missing ? " and " : " or ");
+}
+
+void say_verdict(const Run& run, const Findings& found) {
+  const diagnosis::Diagnosis& d = found.diagnosis;
+  const diagnosis::Unexplained& left = found.unexplained;
+  switch (d.verdict) {
+    case Verdict::nothing_missing:
+      run.say(fmt::format("  nothing missing: {}", d.why));
+      break;
+    case Verdict::missing:
+      run.say(fmt::format("  missing:  {}{}", with_probabilities(found),
+                          left.low_mm > found.priors.unexplained_bound_mm
+                              ? fmt::format(", and {:.1f} mm that no effect here explains", left.mean_mm)
+                              : ""));
+      break;
+    case Verdict::ambiguous:
+      run.say(fmt::format("  missing, cannot be told apart: {}; {}", with_probabilities(found), d.why));
+      break;
+    case Verdict::unexplained:
+      run.say(fmt::format("  unexplained: {}{}", d.why,
+                          d.missing.empty() ? "" : "; best of the catalogue: " + with_probabilities(found)));
+      if (found.forces)
+        run.say(
+            fmt::format("  hint:     forces on the skin that would explain it reach {:.2f} kPa, {:.2f} by chance; "
+                        "missing_force_kpa in diagnosis.vtp",
+                        found.forces->force_kpa.rowwise().norm().maxCoeff(), found.forces->threshold_kpa));
+  }
+}
+
+void say_limits(const Run& run, const DiagnosisResult& result) {
+  const Findings& found = *result.found;
+  std::vector<std::string> blind = diagnosis::not_seen(found);
+  blind.insert(blind.end(), found.unseen.begin(), found.unseen.end());
+  const auto& set = found.diagnosis.missing;
+  if (found.diagnosis.verdict == Verdict::missing && !found.diagnosis.ambiguous_rest.empty())
+    run.say("  and perhaps: " + joined(found.diagnosis.ambiguous_rest, " or "));
+  run.say(fmt::format("  could not be seen with this scan: {}",
+                      blind.empty() ? "none" : fmt::format("{}", fmt::join(blind, ", "))));
+  if (!result.next.empty()) {
+    const auto& best = result.next.front();
+    std::string text = "  next measurement: " + best.measurement;
+    if (set.size() > 1 && best.separation > 0)
+      text += fmt::format(" would separate {} by {:.0f} (9 is enough)", best.closest_pair, best.separation);
+    if (!best.shows.empty()) text += fmt::format("; shows {} best of what cannot be seen now", best.shows);
+    run.say(text);
+  }
+  if (found.diagnosis.verdict == Verdict::missing)
+    run.say(fmt::format("  add it:   supine-model add {} model.toml && make CASE=... calibrate", set[0]));
+}
+
+}  // namespace
+
+void say_diagnosis(const Run& run, const DiagnosisResult& result) {
+  const Findings& found = *result.found;
+  const auto& b = found.budget;
+  say_places(run, found);
+  say_hypotheses(run, found);
+  run.say(
+      fmt::format("  residual: MAE {:.2f} mm, RMS {:.2f}, held-out {:.2f}; scan noise {:.2f}, registration {:.2f}, "
+                  "numerical {:.2f}, parameters {:.2f}, patchiness {:.2f}, unexplained {:.2f}",
+                  found.base.fit.residuals.distance_mm.cwiseAbs().mean(), b.total, found.held_out_rms_mm, b.noise,
+                  b.registration, b.numerical, b.parameters, b.patchiness, b.model_form));
+  run.say("  where:    " + where(result.hot_spots));
+  say_verdict(run, found);
+  say_limits(run, result);
+}
+
+}  // namespace supine::pipeline
