@@ -43,10 +43,6 @@ double chi_squared_power(int freedom, double lambda, double value) {
   return boost::math::cdf(complement(boost::math::non_central_chi_squared(freedom, lambda), std::max(0.0, value)));
 }
 
-Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& normal_matrix) {
-  return normal_matrix.completeOrthogonalDecomposition().pseudoInverse();
-}
-
 Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& columns) {
   if (columns.cols() == 0) return columns;
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns);

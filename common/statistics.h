@@ -29,11 +29,6 @@ double chi_squared_above(int freedom, double value);
 /// Chance that a χ² of @p freedom degrees and noncentrality @p lambda is above @p value; 0 with fewer than one degree.
 double chi_squared_power(int freedom, double lambda, double value);
 
-/// Covariance of what has the information @p normal_matrix: its pseudo-inverse (Moore, Penrose). Directions without
-/// information have no variance.
-/// @param normal_matrix  square, symmetric, positive semidefinite
-Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& normal_matrix);
-
 /// Orthonormal basis of the column space, #rows by rank; as given where there are no columns.
 Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& columns);
 

@@ -37,16 +37,6 @@ TEST(Statistics, ChiSquaredQuantilesAndTailsOfTheTables) {
   EXPECT_NEAR(chi_squared_power(1, 7.849, 3.8415), 0.8, 1e-3);
 }
 
-TEST(Statistics, CovarianceOfASingularNormalMatrixIsItsPseudoInverse) {
-  Eigen::Matrix2d regular;
-  regular << 2, 1, 1, 3;  // determinant 5
-  Eigen::Matrix2d inverse;
-  inverse << 0.6, -0.2, -0.2, 0.4;
-  EXPECT_TRUE(covariance_of(regular).isApprox(inverse, 1e-14));
-  const Eigen::Vector2d a(3, 4);  // (a aᵀ)⁺ = a aᵀ / |a|⁴
-  EXPECT_TRUE(covariance_of(a * a.transpose()).isApprox(a * a.transpose() / 625, 1e-13));
-}
-
 TEST(Statistics, BasisSpansTheColumnsAndNothingElse) {
   Eigen::MatrixXd columns(4, 3);
   columns << 1, 2, 3, 0, 1, 1, 2, 0, 2, 1, 1, 2;  // the third is the sum of the others
