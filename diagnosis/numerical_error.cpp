@@ -18,9 +18,10 @@ namespace {
 
 using calibration::Residuals;
 
-constexpr double order_doubt = 0.3;     // of the change that quadratic elements make
-constexpr double edge_share = 0.5;      // of the finer mesh's edges where skin and cut face meet
-constexpr double triangle_share = 0.8;  // of the coarser surface
+constexpr double order_doubt = 0.5;          // of the change that quadratic elements make
+constexpr double edge_share = 0.5;           // of the finer mesh's edges where skin and cut face meet
+constexpr double triangle_share = 0.8;       // of the coarser surface of a quadratic mesh
+constexpr double few_triangles_share = 0.5;  // of a linear one
 
 /// A field on the corners of linear tetrahedra as one on the nodes of quadratic ones of the same shapes.
 Points on_quadratic(const meshing::TetMesh& quadratic, const Points& corners) {
@@ -48,11 +49,11 @@ simulation::ChainSolution followed(const meshing::TetMesh& quadratic, const Nume
   const auto moved = [&quadratic](const Points& from, const Points& then, const Points& now) {
     return Points(from + on_quadratic(quadratic, now - then));
   };
-  simulation::ChainSolution start = near.finer;
-  start.prone = moved(start.prone, near.given.prone, linear.prone);
-  start.X = moved(start.X, near.given.X, linear.X);
+  simulation::ChainSolution start = near.coarse_quadratic;
+  start.prone = moved(start.prone, near.coarse_linear.prone, linear.prone);
+  start.X = moved(start.X, near.coarse_linear.X, linear.X);
   for (std::size_t p = 0; p < start.poses.size(); ++p)
-    start.poses[p].x = moved(start.poses[p].x, near.given.poses[p].x, linear.poses[p].x);
+    start.poses[p].x = moved(start.poses[p].x, near.coarse_linear.poses[p].x, linear.poses[p].x);
   return start;
 }
 
@@ -85,33 +86,72 @@ calibration::Prediction predicted_on(const calibration::MeasuredScene& scene, co
   return evaluator.predict(model, near);
 }
 
-/// Change of distance of the residuals' points. Points beyond the border of the other mesh keep theirs.
-Eigen::VectorXd change_of(const Residuals& residuals, const calibration::Prediction& prediction) {
-  Eigen::VectorXd change = Eigen::VectorXd::Zero(residuals.size());
+/// Distance of the residuals' points; NaN beyond the border of the mesh it was found on.
+Eigen::VectorXd distances_of(const Residuals& residuals, const calibration::Prediction& prediction) {
+  Eigen::VectorXd there(residuals.size());
   for (Eigen::Index r = 0; r < residuals.size(); ++r) {
     const auto& distances = prediction.poses[static_cast<std::size_t>(residuals.pose[r])].distances;
     const int point = residuals.point[r];
-    if (!distances.closest.on_border[point]) change[r] = distances.distance_mm[point] - residuals.distance_mm[r];
+    there[r] = distances.closest.on_border[point] ? std::nan("") : distances.distance_mm[point];
   }
-  return change;
+  return there;
 }
 
-/// Fills finer_mm and what it comes from.
-/// @param near  or nullptr
-void measure_finer(const calibration::MeasuredScene& scene, const simulation::Model& model, const calibration::Fit& fit,
-                   const NumericalError* near, NumericalError& result) {
-  if (scene.mesh->order() != 1) {
-    const meshing::TetMesh mesh = other_mesh(*scene.mesh, *scene.anatomy, edge_share);
-    result.finer_mm = change_of(fit.residuals, predicted_on(scene, mesh, model, nullptr, enough()));
-    return;
+/// b − a; zero where either says nothing.
+Eigen::VectorXd change(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
+  return (b - a).unaryExpr([](double d) { return std::isnan(d) ? 0.0 : d; });
+}
+
+/// What @p measure says, or into @p failure why it says nothing.
+template <class Measure>
+void attempt(std::string& failure, Measure measure) {
+  try {
+    measure();
+  } catch (const std::exception& why) {
+    failure = why.what();
   }
-  const meshing::TetMesh mesh = meshing::to_quadratic(*scene.mesh);
-  const simulation::ChainSolution& linear = fit.prediction.solution;
-  const bool known = near != nullptr && near->finer.X.rows() == mesh.points.rows();
-  const simulation::ChainSolution start = known ? followed(mesh, *near, linear) : on_quadratic(mesh, linear);
-  calibration::Prediction finer = predicted_on(scene, mesh, model, &start, enough_from_near());
-  result.finer_mm = change_of(fit.residuals, finer);
-  result.model = model, result.given = linear, result.finer = std::move(finer.solution);
+}
+
+/// Fills finer_mm, coarser_mm and where they come from, for linear elements.
+void measure_on_coarse(const calibration::MeasuredScene& scene, const simulation::Model& model,
+                       const calibration::Fit& fit, const NumericalError* near, NumericalError& result) {
+  const bool known = near != nullptr && near->coarse;
+  result.coarse =
+      known ? near->coarse
+            : std::make_shared<const meshing::TetMesh>(coarser_mesh(*scene.mesh, *scene.anatomy, few_triangles_share));
+  calibration::Prediction linear =
+      predicted_on(scene, *result.coarse, model, known ? &near->coarse_linear : nullptr, enough());
+  const Eigen::VectorXd given = fit.residuals.distance_mm, l = distances_of(fit.residuals, linear);
+  result.coarse_linear = std::move(linear.solution);
+  result.coarser_mm = change(given, l);
+  const meshing::TetMesh quadratic = meshing::to_quadratic(*result.coarse);
+  const bool followable = known && near->coarse_quadratic.X.rows() == quadratic.points.rows();
+  const simulation::ChainSolution start =
+      followable ? followed(quadratic, *near, result.coarse_linear) : on_quadratic(quadratic, result.coarse_linear);
+  calibration::Prediction finer = predicted_on(scene, quadratic, model, &start, enough_from_near());
+  const Eigen::VectorXd order = change(l, distances_of(fit.residuals, finer));
+  result.coarse_quadratic = std::move(finer.solution);
+  const double r =
+      std::cbrt(static_cast<double>(result.coarse->cells.rows()) / static_cast<double>(scene.mesh->cells.rows()));
+  result.finer_mm = r * order;
+  result.coarser_mm = (result.coarser_mm + (1 - r) * order) / std::max(1.0, 1 / (r * r) - 1);
+}
+
+/// The same for quadratic ones, on two meshes side by side.
+void measure_on_two(const calibration::MeasuredScene& scene, const simulation::Model& model,
+                    const calibration::Fit& fit, NumericalError& result) {
+  const auto on = [&](const meshing::TetMesh& mesh) {
+    return change(fit.residuals.distance_mm,
+                  distances_of(fit.residuals, predicted_on(scene, mesh, model, nullptr, enough())));
+  };
+#pragma omp parallel sections
+  {
+#pragma omp section
+    attempt(result.finer_failure, [&] { result.finer_mm = on(other_mesh(*scene.mesh, *scene.anatomy, edge_share)); });
+#pragma omp section
+    attempt(result.coarser_failure,
+            [&] { result.coarser_mm = on(coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share)); });
+  }
 }
 
 /// Root of a field of squares as seen around each point, over its root mean square: edges and folds err by more than
@@ -136,26 +176,33 @@ Eigen::VectorXd share_around(const Residuals& residuals, const Eigen::VectorXd& 
   return share / std::sqrt(mean_square(share));
 }
 
-/// Fills what follows from the two changes. @throws NumericalFailure  neither mesh gave an answer
-void summarise(const calibration::MeasuredScene& scene, const Residuals& residuals, NumericalError& result) {
+/// Fills what follows from the two changes.
+void summarise(const calibration::MeasuredScene& scene, const calibration::Fit& fit, NumericalError& result) {
+  constexpr double unknown_length_mm = 25;
+  const Residuals& residuals = fit.residuals;
   const bool finer = result.finer_failure.empty(), coarser = result.coarser_failure.empty();
-  if (!finer && !coarser)
-    throw NumericalFailure("the error of the mesh cannot be measured: finer mesh: " + result.finer_failure +
-                           "; coarser mesh: " + result.coarser_failure);
   result.finer_doubt = scene.mesh->order() == 1 ? order_doubt : 1;
   if (!finer) result.finer_mm = Eigen::VectorXd::Zero(residuals.size());
   if (!coarser) result.coarser_mm = Eigen::VectorXd::Zero(residuals.size());
-  const double twice = finer && coarser ? 1 : 2;
   const Eigen::VectorXd square =
       std::pow(result.finer_doubt, 2) * result.finer_mm.cwiseAbs2() + result.coarser_mm.cwiseAbs2();
-  result.spread_mm = std::sqrt(twice * square.mean());
+  result.spread_mm = std::sqrt(square.mean());
   result.share = share_around(residuals, square);
-  result.length_mm = 0.5 * twice *
-                     ((finer ? correlation_length_mm(residuals, result.finer_mm) : 0) +
-                      (coarser ? correlation_length_mm(residuals, result.coarser_mm) : 0));
+  if (finer && coarser) {
+    result.length_mm =
+        0.5 * (correlation_length_mm(residuals, result.finer_mm) + correlation_length_mm(residuals, result.coarser_mm));
+    return;
+  }
+  result.length_mm = unknown_length_mm;
+  result.spread_mm = std::max(result.spread_mm, largest_share_of_way * way_mm(fit.prediction.solution));
 }
 
 }  // namespace
+
+double way_mm(const simulation::ChainSolution& solution) {
+  const Points way = solution.poses[0].x - solution.prone;
+  return std::sqrt(way.squaredNorm() / static_cast<double>(way.rows()));
+}
 
 double correlation_length_mm(const Residuals& residuals, const Eigen::VectorXd& field) {
   constexpr double near_mm = 6, far_mm = 14;
@@ -181,23 +228,12 @@ double correlation_length_mm(const Residuals& residuals, const Eigen::VectorXd& 
 NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, const simulation::Model& model,
                                        const calibration::Fit& fit, const NumericalError* near) {
   NumericalError result;
-#pragma omp parallel sections
-  {
-#pragma omp section
-    try {
-      measure_finer(scene, model, fit, near, result);
-    } catch (const std::exception& failure) {
-      result.finer_failure = failure.what();
-    }
-#pragma omp section
-    try {
-      const meshing::TetMesh mesh = coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share);
-      result.coarser_mm = change_of(fit.residuals, predicted_on(scene, mesh, model, nullptr, enough()));
-    } catch (const std::exception& failure) {
-      result.coarser_failure = failure.what();
-    }
-  }
-  summarise(scene, fit.residuals, result);
+  if (scene.mesh->order() == 1)
+    attempt(result.finer_failure, [&] { measure_on_coarse(scene, model, fit, near, result); });
+  else
+    measure_on_two(scene, model, fit, result);
+  if (result.coarser_mm.size() == 0 && result.coarser_failure.empty()) result.coarser_failure = result.finer_failure;
+  summarise(scene, fit, result);
   return result;
 }
 

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "calibration/least_squares.h"
+#include "meshing/tet_mesh.h"
 
 namespace supine::diagnosis {
 
@@ -13,24 +15,32 @@ namespace supine::diagnosis {
 struct NumericalError {
   Eigen::VectorXd finer_mm;    ///< #R, distance with finer elements, less that on the given mesh
   double finer_doubt = 1;      ///< how uncertain finer_mm is, as a share of it
-  Eigen::VectorXd coarser_mm;  ///< #R, the same for another surface of four fifths of the triangles
+  Eigen::VectorXd coarser_mm;  ///< #R, what another surface of the body changes
   double spread_mm = 0;        ///< rms of finer_doubt × finer_mm and coarser_mm: what is left when finer_mm was added
   Eigen::VectorXd share;       ///< #R, of the spread at each point: what the places around it show; mean square 1
   double length_mm = 0;        ///< over which it is alike
-  /// Why a mesh gave no answer, or empty; where it gave none its column is zero and the other counts twice in
-  /// the spread.
+  /// Why a mesh gave no answer, or empty. Its column is zero then, and the spread not less than largest_share_of_way
+  /// of the way to the first pose.
   std::string finer_failure, coarser_failure;
-  /// Of linear elements: what finer_mm comes from, to start the next one from.
-  simulation::Model model;
-  simulation::ChainSolution given, finer;
+  /// Of linear elements: the coarser mesh with linear and quadratic elements, to start the next ones from.
+  std::shared_ptr<const meshing::TetMesh> coarse;
+  simulation::ChainSolution coarse_linear, coarse_quadratic;
 };
 
-/// Two other meshes, one solve each, side by side. Finer than linear tetrahedra are quadratic ones of the same shapes
-/// (nearly all of the error is in the order: at the true moduli of a computed breast they leave noise and a third of
-/// the change, docs/diagnosis.md), finer than quadratic ones a mesh refined at the skin's end; coarser_mesh
-/// (other_mesh.h).
+/// Spread where it could not be measured, as a share of the way that the body has moved: as large as the largest that
+/// was measured on computed breasts (docs/diagnosis.md).
+inline constexpr double largest_share_of_way = 0.03;
+
+/// Way from the imaged pose to the first other one, rms over the nodes.
+double way_mm(const simulation::ChainSolution& solution);
+
+/// Of linear elements: nearly all of their error is in the order, and falls as the edge. A mesh of a third of the
+/// cells is solved with linear (l) and quadratic (q) elements, which takes a tenth of what quadratic elements of the
+/// given mesh take; with r the ratio of the edges, given over coarse, from the numbers of cells,
+///   finer = r (q − l),   coarser = (l − given + (1 − r)(q − l)) / max(1, r⁻² − 1),
+/// the latter what is left of the change between the two linear ones: the surface, of second order.
+/// Of quadratic ones: a mesh refined at the skin's end, and one on a coarser surface (other_mesh.h).
 /// @param near  of the same scene and a similar model, to start from; or nullptr
-/// @throws NumericalFailure  neither mesh gave an answer
 NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, const simulation::Model& model,
                                        const calibration::Fit& fit, const NumericalError* near = nullptr);
 

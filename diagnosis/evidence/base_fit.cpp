@@ -70,11 +70,6 @@ void add_shared(const BaseFit& base, const Priors& priors, const VectorXd& share
     }
 }
 
-double way_mm(const calibration::Prediction& prediction) {
-  const Points way = prediction.solution.poses[0].x - prediction.solution.prone;
-  return std::sqrt(way.squaredNorm() / static_cast<double>(way.rows()));
-}
-
 void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitivities, const Priors& priors,
                  BaseFit& base) {
   const Residuals& residuals = base.fit.residuals;
@@ -96,7 +91,7 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
   }
   base.kernel =
       discrepancy_kernel(*evaluator.scene().mesh, sensitivities, base.fit.prediction, residuals, base.clusters);
-  base.scale_mm = std::max(priors.least_unexplained_mm, priors.share_of_way * way_mm(base.fit.prediction));
+  base.scale_mm = std::max(priors.least_unexplained_mm, priors.share_of_way * way_mm(base.fit.prediction.solution));
   base.most_mm = priors.most_unexplained_mm;
   base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);
 }
@@ -196,13 +191,7 @@ class Fitter {
 
 void measure_mesh(Evaluator& evaluator, BaseFit& base) {
   const std::optional<NumericalError> before = std::move(base.numerical);
-  base.numerical.reset();
-  base.numerical_failure.clear();
-  try {
-    base.numerical = measure_numerical_error(evaluator.scene(), base.model, base.fit, before ? &*before : nullptr);
-  } catch (const NumericalFailure& failure) {
-    base.numerical_failure = failure.what();
-  }
+  base.numerical = measure_numerical_error(evaluator.scene(), base.model, base.fit, before ? &*before : nullptr);
 }
 
 VectorXd coordinates_of(const FreeParameters& parameters, const simulation::Model& start) {
@@ -260,10 +249,7 @@ BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, con
   for (int round = 0; round < most_rounds; ++round) {
     const VectorXd measured_at = base.fit.u;
     tell("errors of mesh and body");
-    if (options.other_meshes)
-      measure_mesh(evaluator, base);
-    else
-      base.numerical_failure = "not asked for";
+    if (options.other_meshes) measure_mesh(evaluator, base);
     find_errors(evaluator, *fitter.linearise(), options.priors, base);
     for (int step = 0; step < most_steps; ++step) {
       tell("fit with all that is never known");

@@ -33,8 +33,7 @@ struct BaseFit {
   std::unique_ptr<ErrorCovariance> covariance;  ///< of both
   double scale_mm = 0, most_mm = 0;             ///< of the prior of the discrepancy's size
   double size_mm = 0;                           ///< s of the discrepancy that is likeliest
-  std::optional<NumericalError> numerical;
-  std::string numerical_failure;
+  std::optional<NumericalError> numerical;      ///< none: the mesh is taken to be exact
   int evaluations = 0;
 
   /// Distances over the clusters, the mesh's error taken away.

@@ -17,12 +17,14 @@ namespace {
 namespace fs = std::filesystem;
 
 void warn_of_missing_mesh(Run& run, const diagnosis::NumericalError& error) {
-  if (!error.finer_failure.empty())
-    run.warn("the distances are not corrected for the mesh: finer elements give no answer (" + error.finer_failure +
-             "); a coarser mesh alone says how far it may be wrong");
-  if (!error.coarser_failure.empty())
-    run.warn("the error of the mesh is known from finer elements alone; the coarser mesh gives no answer (" +
-             error.coarser_failure + ")");
+  if (error.finer_failure.empty() && error.coarser_failure.empty()) return;
+  const bool both = error.finer_failure == error.coarser_failure;
+  const std::string& why = error.finer_failure.empty() ? error.coarser_failure : error.finer_failure;
+  run.warn(fmt::format("the error of the mesh could not be measured: {} ({}). It is taken to be {:.1f} mm",
+                       both                          ? "no other mesh gives an answer"
+                       : error.finer_failure.empty() ? "a coarser surface gives no answer"
+                                                     : "better elements give no answer",
+                       why, error.spread_mm));
 }
 
 class DiagnoseTool : public Tool {
@@ -87,7 +89,7 @@ class DiagnoseTool : public Tool {
     const simulation::Model given = given_model(run, *measured);
     auto found = diagnosis::examine(subject_of(*measured, given, noise), options_);
     if (!found->base.numerical)
-      run.warn("the mesh is taken to be exact (" + found->base.numerical_failure + ")");
+      run.warn("the mesh is taken to be exact (--no-other-meshes)");
     else
       warn_of_missing_mesh(run, *found->base.numerical);
     run.stage("next measurement");

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/rms.h"
 #include "common/statistics.h"
 #include "diagnosis/diagnosis_file.h"
 
@@ -142,12 +143,15 @@ Json budget_json(const diagnosis::ErrorBudget& b) {
 }
 
 Json numerical_json(const Findings& found) {
-  if (!found.base.numerical) return {{"failed", found.base.numerical_failure}};
+  if (!found.base.numerical) return {{"failed", "not asked for"}};
   Json failed = Json::array();
   const diagnosis::NumericalError& error = *found.base.numerical;
   if (!error.finer_failure.empty()) failed.push_back("finer mesh: " + error.finer_failure);
   if (!error.coarser_failure.empty()) failed.push_back("coarser mesh: " + error.coarser_failure);
-  return {{"spread_mm", error.spread_mm}, {"length_mm", error.length_mm}, {"failed", failed}};
+  return {{"correction_mm", rms(error.finer_mm)},
+          {"spread_mm", error.spread_mm},
+          {"length_mm", error.length_mm},
+          {"failed", failed}};
 }
 
 Json forces_json(const Findings& found) {
