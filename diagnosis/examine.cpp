@@ -46,7 +46,7 @@ bool something_stands_out(const Findings& found) {
 const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses) {
   double sum = 0;
   for (const Hypothesis& h : hypotheses) {
-    if (!h.effects.empty() && !h.refitted && h.probability >= worth_refitting) return &h;
+    if (!h.effects.empty() && !h.refitted && !h.unsolved && h.probability >= worth_refitting) return &h;
     sum += h.probability;
     if (sum >= held_by_refits) break;
   }
@@ -59,7 +59,7 @@ const Hypothesis* simpler_than_first(const std::vector<Hypothesis>& hypotheses) 
   const Hypothesis& first = hypotheses.front();
   if (!first.refitted || first.effects.size() < 2) return nullptr;
   const auto is_simpler = [&first](const Hypothesis& h) {
-    return !h.refitted && h.effects.size() + 1 == first.effects.size() &&
+    return !h.refitted && !h.unsolved && h.effects.size() + 1 == first.effects.size() &&
            std::includes(first.effects.begin(), first.effects.end(), h.effects.begin(), h.effects.end());
   };
   const auto found = std::find_if(hypotheses.begin(), hypotheses.end(), is_simpler);
@@ -77,9 +77,10 @@ void follow_one(const Subject& subject, const ExamineOptions& options, const Hyp
     if (refit.solved)
       h = refit.hypothesis;
     else
-      h.refitted = true;  // stays as screened
+      h.unsolved = true;
   }
   found.refits.push_back(std::move(refit));
+  lower_unfollowed(found.hypotheses);
   normalise(found.hypotheses);
 }
 

@@ -18,7 +18,7 @@ namespace {
 
 using calibration::Residuals;
 
-constexpr double order_doubt = 0.5;          // of the change that quadratic elements make
+constexpr double order_doubt = 0.8;          // of the change that quadratic elements make
 constexpr double edge_share = 0.5;           // of the finer mesh's edges where skin and cut face meet
 constexpr double triangle_share = 0.8;       // of the coarser surface of a quadratic mesh
 constexpr double few_triangles_share = 0.5;  // of a linear one

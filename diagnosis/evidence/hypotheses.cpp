@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <set>
 
@@ -54,6 +55,15 @@ int Hypothesis::place_of(const std::string& name) const {
 
 double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t size) {
   return std::log(priors.of_sets.at(size) / binomial(candidates, size));
+}
+
+void lower_unfollowed(std::vector<Hypothesis>& hypotheses) {
+  double fall = std::numeric_limits<double>::infinity();
+  for (const Hypothesis& h : hypotheses)
+    if (h.refitted) fall = std::min(fall, h.screened - h.ln_evidence);
+  if (!std::isfinite(fall)) return;
+  for (Hypothesis& h : hypotheses)
+    if (!h.refitted && !h.effects.empty()) h.ln_evidence = h.screened - std::max(fall, 0.0);
 }
 
 void normalise(std::vector<Hypothesis>& hypotheses) {
@@ -132,7 +142,7 @@ Hypothesis Screening::weigh(std::vector<int> effects) const {
   h.effects = std::move(effects);
   h.evidence = evidence_;
   h.weighed = evidence_->weigh(h.rows);
-  h.ln_evidence = h.weighed.ln_evidence;
+  h.ln_evidence = h.screened = h.weighed.ln_evidence;
   return h;
 }
 

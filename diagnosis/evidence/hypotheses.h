@@ -15,8 +15,10 @@ struct Hypothesis {
   std::vector<int> effects;                        ///< rows of the candidates, ascending; none: nothing is missing
   double ln_prior = 0;                             ///< of the set
   double ln_evidence = 0;                          ///< up to what is the same for all
+  double screened = 0;                             ///< the same along straight lines
   double probability = 0;                          ///< posterior, over all that were weighed
   bool refitted = false;                           ///< through the whole chain, else along straight lines
+  bool unsolved = false;                           ///< the chain found no equilibrium: stays as screened
   Weighed weighed;                                 ///< by rows
   std::vector<int> rows;                           ///< of the evidence's directions
   std::shared_ptr<const LinearEvidence> evidence;  ///< it was weighed by
@@ -47,6 +49,9 @@ class Screening {
 
 /// ln of the prior of one set of @p size out of @p candidates effects.
 double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t size);
+
+/// What was not followed through the chain is lowered by the smallest fall of the evidence that following showed.
+void lower_unfollowed(std::vector<Hypothesis>& hypotheses);
 
 /// Fills the probabilities and puts the most probable first.
 void normalise(std::vector<Hypothesis>& hypotheses);

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/evidence/hypotheses.h"
+
+#include <gtest/gtest.h>
+
+namespace supine::diagnosis {
+namespace {
+
+Hypothesis screened(std::vector<int> effects, double ln_evidence) {
+  Hypothesis h;
+  h.effects = std::move(effects);
+  h.ln_evidence = h.screened = ln_evidence;
+  return h;
+}
+
+TEST(Hypotheses, WhatWasNotFollowedFallsByTheSmallestFallOfWhatWas) {
+  std::vector<Hypothesis> list = {screened({}, 0), screened({0}, 5), screened({1}, 4), screened({0, 1}, 6),
+                                  screened({2}, 3)};
+  list[1].ln_evidence = 2, list[1].refitted = true;  // fell by 3
+  list[2].ln_evidence = 3, list[2].refitted = true;  // by 1
+  list[4].unsolved = true;                           // says nothing of how far lines lead astray
+  for (int twice = 0; twice < 2; ++twice) {
+    lower_unfollowed(list);
+    EXPECT_EQ(list[0].ln_evidence, 0) << "nothing is fitted, not screened";
+    EXPECT_EQ(list[1].ln_evidence, 2);
+    EXPECT_EQ(list[2].ln_evidence, 3);
+    EXPECT_EQ(list[3].ln_evidence, 5);
+    EXPECT_EQ(list[4].ln_evidence, 2);
+  }
+}
+
+TEST(Hypotheses, ARiseOfWhatWasFollowedRaisesNothing) {
+  std::vector<Hypothesis> list = {screened({0}, 5), screened({1}, 4)};
+  list[0].ln_evidence = 9, list[0].refitted = true;
+  lower_unfollowed(list);
+  EXPECT_EQ(list[1].ln_evidence, 4);
+}
+
+TEST(Hypotheses, NothingFallsWhereNothingWasFollowed) {
+  std::vector<Hypothesis> list = {screened({}, 0), screened({0}, 5)};
+  lower_unfollowed(list);
+  EXPECT_EQ(list[1].ln_evidence, 5);
+}
+
+}  // namespace
+}  // namespace supine::diagnosis
