@@ -36,9 +36,9 @@ struct ScanNoise {
 
 /// White is what neighbouring points show, where there are enough of them. Where that is less than the case says, the
 /// rest is taken to be shared.
-ScanNoise noise_of(const Residuals& residuals, double shared_mm) {
+ScanNoise noise_of(const Residuals& residuals, const VectorXd& shared_mm) {
   constexpr int fewest = 200;
-  ScanNoise noise{residuals.sigma_mm, VectorXd::Constant(residuals.size(), shared_mm)};
+  ScanNoise noise{residuals.sigma_mm, shared_mm};
   for (int pose = 0; pose <= residuals.pose.maxCoeff(); ++pose) {
     std::vector<int> rows;
     for (Index r = 0; r < residuals.size(); ++r)
@@ -48,7 +48,7 @@ ScanNoise noise_of(const Residuals& residuals, double shared_mm) {
     for (const int r : rows) {
       const double given = residuals.sigma_mm[r];
       noise.white_mm[r] = seen;
-      noise.shared_mm[r] = std::max(shared_mm, std::sqrt(std::max(0.0, given * given - seen * seen)));
+      noise.shared_mm[r] = std::max(shared_mm[r], std::sqrt(std::max(0.0, given * given - seen * seen)));
     }
   }
   return noise;
@@ -73,7 +73,11 @@ void add_shared(const BaseFit& base, const Priors& priors, const VectorXd& share
 void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitivities, const Priors& priors,
                  BaseFit& base) {
   const Residuals& residuals = base.fit.residuals;
-  const ScanNoise noise = noise_of(residuals, priors.scan_shared_mm);
+  VectorXd shared_mm(residuals.size());
+  for (Index r = 0; r < shared_mm.size(); ++r)
+    shared_mm[r] =
+        priors.scan_shared_in(evaluator.scene().measurements[static_cast<std::size_t>(residuals.pose[r])]->pose.name);
+  const ScanNoise noise = noise_of(residuals, shared_mm);
   base.noise_of_point_mm = noise.white_mm;
   const VectorXd variance = base.clusters.means(base.noise_of_point_mm.cwiseAbs2());
   base.errors = variance.cwiseQuotient(base.clusters.members).asDiagonal();
@@ -243,7 +247,7 @@ BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, con
   base.noise_mm = noise_mm;
   base.parameters.emplace(given);
   Fitter fitter(evaluator, base);
-  base.nuisances = nuisances_of(given, fitter.poses(), options.priors.known);
+  base.nuisances = nuisances_of(given, fitter.poses(), options.priors);
   fitter.predict({coordinates_of(*base.parameters, start), base.nuisances}, near);
   base.clusters = calibration::cluster_points(base.fit.residuals, most_clusters);
   for (int round = 0; round < most_rounds; ++round) {

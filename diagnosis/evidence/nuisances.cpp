@@ -22,16 +22,18 @@ bool has(const Model& model, const std::string& effect) {
                      [&effect](const EffectSetting& setting) { return setting.name == effect; });
 }
 
-void add_of_effect(const Effect& effect, const std::vector<std::string>& poses,
-                   const simulation::MeasurementTolerances& known, std::vector<Nuisance>& list) {
+void add_of_effect(const Effect& effect, const std::vector<std::string>& poses, const Priors& priors,
+                   std::vector<Nuisance>& list) {
   const simulation::EffectTraits traits = effect.traits();
   for (const simulation::Parameter& row : effect.parameters()) {
-    const double sigma = effect.tolerance(row.unit, known);
-    if (row.shape || sigma == 0) continue;
-    if (!traits.error_of_each_scan) list.push_back({traits.error_source, {}, effect.name(), row.name, sigma, {}});
-    for (const std::string& pose : poses)
-      if (traits.error_of_each_scan && pose != "prone")
+    if (row.shape) continue;
+    const auto add = [&](const std::string& pose, const simulation::MeasurementTolerances& known) {
+      if (const double sigma = effect.tolerance(row.unit, known); sigma > 0)
         list.push_back({traits.error_source, pose, effect.name(), row.name, sigma, {}});
+    };
+    if (!traits.error_of_each_scan) add({}, priors.known);
+    for (const std::string& pose : poses)
+      if (traits.error_of_each_scan && pose != "prone") add(pose, priors.known_in(pose));
   }
 }
 
@@ -44,17 +46,16 @@ EffectSetting& setting_of(std::vector<EffectSetting>& settings, const std::strin
 
 }  // namespace
 
-std::vector<Nuisance> nuisances_of(const Model& model, const std::vector<std::string>& poses,
-                                   const simulation::MeasurementTolerances& known) {
+std::vector<Nuisance> nuisances_of(const Model& model, const std::vector<std::string>& poses, const Priors& priors) {
   std::vector<Nuisance> list;
   for (const Effect* effect : simulation::catalogue()) {
     const simulation::EffectTraits traits = effect->traits();
     if (traits.error_source.empty() || (has(model, effect->name()) && !traits.error_of_each_scan)) continue;
-    add_of_effect(*effect, poses, known, list);
+    add_of_effect(*effect, poses, priors, list);
   }
   for (const std::string name : springs)
     if (const simulation::Setting& setting = simulation::base_setting(model, name); !setting.free && setting.value > 0)
-      list.push_back({"springs", {}, {}, name, known.spring_log, {}});
+      list.push_back({"springs", {}, {}, name, priors.known.spring_log, {}});
   return list;
 }
 

@@ -27,7 +27,7 @@ struct Nuisance {
 /// All of them, at their null, without shapes. What the model fits itself, or an effect of it says once for all poses,
 /// is not there.
 std::vector<Nuisance> nuisances_of(const simulation::Model& model, const std::vector<std::string>& poses,
-                                   const simulation::MeasurementTolerances& known);
+                                   const Priors& priors);
 
 /// The model with the nuisances at their values.
 simulation::Model with_nuisances(simulation::Model model, const std::vector<Nuisance>& nuisances,

@@ -2,17 +2,26 @@
 #pragma once
 
 #include <array>
+#include <map>
+#include <string>
 
 #include "diagnosis/evidence/patchiness.h"
 #include "simulation/effect.h"
 
 namespace supine::diagnosis {
 
+/// How well one measurement is known, where that was said of it.
+struct KnownOfPose {
+  simulation::MeasurementTolerances known;
+  double scan_shared_mm;
+};
+
 /// What is believed before anything is measured: all that a verdict rests on (docs/diagnosis.md).
 struct Priors {
   /// Of sets of none, one, two and three effects; shared evenly by the sets of a size.
   std::array<double, 4> of_sets = {0.5, 0.3, 0.15, 0.05};
   simulation::MeasurementTolerances known = {};  ///< nuisances, 1 sigma
+  std::map<std::string, KnownOfPose> of_pose;    ///< by name, in place of `known` and `scan_shared_mm`
   Patchiness patchiness = {};
   double scan_shared_mm = 0.2, scan_shared_length_mm = 25;  ///< what neighbouring points of a scan err together
   /// What no effect explains is half-Cauchy with the scale max(least_unexplained_mm, share_of_way × rms way from the
@@ -20,6 +29,9 @@ struct Priors {
   double least_unexplained_mm = 0.3, share_of_way = 0.01, most_unexplained_mm = 10;
   double named_at = 0.95;             ///< inclusion probability from which an effect is named
   double unexplained_bound_mm = 0.5;  ///< above it what is left is told as a verdict
+
+  const simulation::MeasurementTolerances& known_in(const std::string& pose) const;
+  double scan_shared_in(const std::string& pose) const;
 };
 
 /// The prior of one number of an effect: normal, or log-normal where only values above null make sense.

@@ -42,8 +42,36 @@ Eigen::Vector3d read_gravity(const TomlReader& pose, const std::string& frame) {
   return lps / length;
 }
 
+/// Keys that say how well a measurement is known, and up to where they make sense.
+struct KnownKey {
+  std::string_view key;
+  std::optional<double> Known::*member;
+  double most;
+};
+constexpr KnownKey known_keys[] = {{"registration_mm", &Known::registration_mm, 50},
+                                   {"registration_deg", &Known::registration_deg, 45},
+                                   {"gravity_deg", &Known::gravity_deg, 45},
+                                   {"breath_mm", &Known::breath_mm, 30},
+                                   {"noise_shared_mm", &Known::noise_shared_mm, 10}};
+
+Known read_known(const TomlReader& reader, const std::string& name) {
+  Known known;
+  for (const KnownKey& row : known_keys) {
+    const auto value = reader.number(row.key);
+    if (!value) continue;
+    if (name == "prone")
+      reader.fail(row.key, "says how well another pose is known beside the image; leave it out of [pose.prone]");
+    if (*value < 0 || *value > row.most)
+      reader.fail(row.key, fmt::format("is 1 sigma and must lie in 0 to {:g}, not {:g}", row.most, *value));
+    known.*row.member = value;
+  }
+  return known;
+}
+
 Pose read_pose(const TomlReader& reader, const std::string& name, const std::string& frame) {
-  reader.allow({"gravity", "surface", "noise_mm", "landmarks"});
+  std::vector<std::string> keys = {"gravity", "surface", "noise_mm", "landmarks"};
+  for (const KnownKey& row : known_keys) keys.emplace_back(row.key);
+  reader.allow(keys);
   Pose pose;
   pose.name = name;
   pose.gravity = read_gravity(reader, frame);
@@ -52,6 +80,7 @@ Pose read_pose(const TomlReader& reader, const std::string& name, const std::str
   pose.noise_mm = reader.number("noise_mm");
   if (pose.noise_mm && *pose.noise_mm <= 0)
     reader.fail("noise_mm", "must be > 0 mm; leave the key out when the noise is not known");
+  pose.known = read_known(reader, name);
   return pose;
 }
 

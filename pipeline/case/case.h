@@ -23,6 +23,14 @@ struct AllowedCuts {
   double rim_mm = 10;     ///< > 0
 };
 
+/// How well a measurement is known, 1 sigma, where the case says so (docs/case-file.md).
+struct Known {
+  std::optional<double> registration_mm, registration_deg;  ///< place of the scan, in each direction
+  std::optional<double> gravity_deg;                        ///< direction of gravity
+  std::optional<double> breath_mm;                          ///< the muscle under the mound
+  std::optional<double> noise_shared_mm;                    ///< what neighbouring points of the scan err together
+};
+
 /// One body position: how things fall, and what was measured there.
 struct Pose {
   std::string name;                                ///< "prone", "supine", or the user's
@@ -30,6 +38,7 @@ struct Pose {
   std::optional<std::filesystem::path> surface;    ///< measured surface
   std::optional<double> noise_mm;                  ///< 1 sigma along the normal; absent = estimate it
   std::optional<std::filesystem::path> landmarks;  ///< CSV
+  Known known;
 };
 
 /// case.toml: what was measured. Coordinates are LPS after reading, whatever `frame` says.
@@ -39,10 +48,11 @@ struct Case {
   std::string frame = "LPS";  ///< of coordinates in files that name none: LPS or RAS
   std::string side;           ///< left, right or both
 
-  std::filesystem::path image_file;  ///< absolute or relative to the working directory, exists
-  std::string image_kind;            ///< labels or mri
-  std::string image_frame;           ///< of a volume that names none (patient_frame.h); empty = `frame`
-  std::string image_series;          ///< of a DICOM folder: number, description or uid; empty = the only one
+  std::filesystem::path image_file;       ///< absolute or relative to the working directory, exists
+  std::string image_kind;                 ///< labels or mri
+  std::string image_frame;                ///< of a volume that names none (patient_frame.h); empty = `frame`
+  std::string image_series;               ///< of a DICOM folder: number, description or uid; empty = the only one
+  std::optional<double> segmentation_mm;  ///< how well the place of the imaged skin is known, 1 sigma
   AllowedCuts cut;
   std::map<int, segmentation::Tissue> labels;  ///< value in the file → tissue (kind = labels)
   std::optional<segmentation::Recipe> recipe;  ///< kind = mri

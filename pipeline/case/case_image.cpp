@@ -70,7 +70,7 @@ fs::path case_path(const TomlReader& reader, std::string_view key, bool folder_a
 void read_case_image(const TomlReader& file, Case& result) {
   const auto image = file.sub_table("image");
   if (!image) file.fail("image", "table [image] is missing: it names the volume");
-  image->allow({"file", "kind", "frame", "series", "cut", "rim_mm", "labels"});
+  image->allow({"file", "kind", "frame", "series", "cut", "rim_mm", "labels", "segmentation_mm"});
   image->required_text("kind");
   result.image_kind = image->choice("kind", {"labels", "mri"}, "labels");
   result.image_file = case_path(*image, "file", true);
@@ -88,6 +88,11 @@ void read_case_image(const TomlReader& file, Case& result) {
     result.image_frame = *frame;
   }
   read_cut(*image, result.cut);
+  constexpr double most_mm = 10;
+  result.segmentation_mm = image->number("segmentation_mm");
+  if (result.segmentation_mm && (*result.segmentation_mm < 0 || *result.segmentation_mm > most_mm))
+    image->fail("segmentation_mm",
+                fmt::format("is 1 sigma and must lie in 0 to {:g}, not {:g}", most_mm, *result.segmentation_mm));
 
   const auto labels = image->sub_table("labels");
   const bool needs_labels = result.image_kind == "labels";

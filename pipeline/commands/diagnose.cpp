@@ -2,9 +2,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <numbers>
 
 #include "common/error.h"
+#include "pipeline/case/case_priors.h"
 #include "pipeline/case/model_file.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/results/diagnosis_report.h"
@@ -53,20 +53,18 @@ class DiagnoseTool : public Tool {
         ->capture_default_str();
     app.add_flag("--no-other-meshes", no_other_meshes_,
                  "do not solve on two other meshes: the mesh is then taken to be exact");
-    app.add_option(
-           "--registration-mm", options_.priors.known.registration_mm,
-           "how well each scan's place is known, 1 sigma per direction, mm; its turn goes with it, 0.75 degrees "
-           "per mm. 0.3 where markers were used")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
-    app.add_option("--segmentation-mm", options_.priors.known.segmentation_mm,
-                   "how well the imaged skin's place is known, 1 sigma")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
-    app.add_option("--chest-wall-mm", options_.priors.known.chest_wall_mm,
-                   "how far breath may move the muscle between two scans, 1 sigma")
-        ->check(CLI::NonNegativeNumber)
-        ->capture_default_str();
+    app.add_option("--registration-mm", known_.registration_mm,
+                   "how well each scan's place is known, 1 sigma per direction, mm; its turn goes with it, 0.75 "
+                   "degrees per mm (default: registration_mm of the case, else 2). 0.3 where markers were used")
+        ->check(CLI::NonNegativeNumber);
+    app.add_option("--segmentation-mm", known_.segmentation_mm,
+                   "how well the imaged skin's place is known, 1 sigma, mm (default: segmentation_mm of the case, "
+                   "else 0.3)")
+        ->check(CLI::NonNegativeNumber);
+    app.add_option("--chest-wall-mm", known_.chest_wall_mm,
+                   "how far breath may move the muscle between two scans, 1 sigma, mm (default: breath_mm of the "
+                   "case, else 1)")
+        ->check(CLI::NonNegativeNumber);
     app.add_flag("--ladder", ladder_,
                  "add what is missing, fit and examine again, until nothing is missing or three effects were added; "
                  "writes ladder.json and model.toml, the model as given with what was added and the fitted numbers");
@@ -84,7 +82,7 @@ class DiagnoseTool : public Tool {
     run.stage("examine");
     LiveProgress live(run, std::chrono::seconds(0));
     options_.other_meshes = !no_other_meshes_;
-    options_.priors.known.registration_rad = turn_per_mm * options_.priors.known.registration_mm;
+    options_.priors = case_priors(measured->description, known_);
     options_.progress = [&live](const std::string& what) { live.show(what); };
     const simulation::Model given = given_model(run, *measured);
     auto found = diagnosis::examine(subject_of(*measured, given, noise), options_);
@@ -111,8 +109,6 @@ class DiagnoseTool : public Tool {
   }
 
  private:
-  static constexpr double turn_per_mm = 0.75 * std::numbers::pi / 180;  // rad: 1.5 degrees go with 2 mm
-
   /// Where priors stand: the case's own model where it has the same effects, else the calibrated one.
   simulation::Model given_model(Run& run, const MeasuredCase& measured) const {
     const fs::path file = case_folder_ / "model.toml";
@@ -171,6 +167,7 @@ class DiagnoseTool : public Tool {
   }
 
   fs::path case_folder_, mesh_file_, model_file_, png_;
+  KnownOptions known_;
   diagnosis::ExamineOptions options_;
   bool no_other_meshes_ = false, ladder_ = false;
 };

@@ -35,8 +35,8 @@ struct Solved {
 TEST(Nuisances, ShapesAreTheSlopesOfTheModelThatCarriesThem) {
   Solved solved;
   const std::vector<std::string> poses = {"prone", "supine"};
-  simulation::MeasurementTolerances known = simulation::MeasurementTolerances{};
-  std::vector<Nuisance> all = nuisances_of(solved.model, poses, known);
+  const Priors priors;
+  std::vector<Nuisance> all = nuisances_of(solved.model, poses, priors);
   find_shapes(solved.evaluator, solved.sensitivities, solved.model, solved.prediction, solved.residuals, all);
   for (const char* name :
        {"supine/misregistration.turn_x_rad", "supine/gravity_tilt.roll_rad", "supine/chest_wall_motion.amplitude_mm",
@@ -60,8 +60,7 @@ TEST(Nuisances, WhatTheModelFitsOrHasAsAnEffectIsNotThereTwice) {
   simulation::Model model = supine::testing::twin_truth();
   const auto names_of = [&model] {
     std::vector<std::string> names;
-    for (const Nuisance& n : nuisances_of(model, {"prone", "supine"}, simulation::MeasurementTolerances{}))
-      names.push_back(n.name());
+    for (const Nuisance& n : nuisances_of(model, {"prone", "supine"}, {})) names.push_back(n.name());
     return names;
   };
   const auto has = [&](const std::string& name) {

@@ -4,8 +4,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <numbers>
 #include <vector>
 
+#include "pipeline/case/case_priors.h"
 #include "tests/pipeline/temporary_folder.h"
 
 namespace supine::pipeline {
@@ -61,6 +63,34 @@ class CaseFile : public testing::Test {
   }
   TemporaryFolder folder_;
 };
+
+TEST_F(CaseFile, SaysHowWellMeasurementsAreKnown) {
+  std::string text = replaced(good, "noise_mm = 0.7",
+                              "noise_mm = 0.7\nregistration_mm = 0.4\ngravity_deg = 1\nbreath_mm = 0.5\n"
+                              "noise_shared_mm = 0.1");
+  text = replaced(text, "gravity = [0.0, 0.6, -0.8]", "gravity = [0.0, 0.6, -0.8]\nregistration_deg = 3");
+  const Case c = read(replaced(text, "rim_mm = 8", "rim_mm = 8\nsegmentation_mm = 0.2"));
+  constexpr double degree = std::numbers::pi / 180;
+  const diagnosis::Priors priors = case_priors(c, {}), defaults;
+  const simulation::MeasurementTolerances supine = priors.known_in("supine"), tilt = priors.known_in("tilt45");
+  EXPECT_EQ(supine.registration_mm, 0.4);
+  EXPECT_DOUBLE_EQ(supine.registration_rad, 0.3 * degree) << "goes with the shift";
+  EXPECT_DOUBLE_EQ(supine.gravity_rad, degree);
+  EXPECT_EQ(supine.chest_wall_mm, 0.5);
+  EXPECT_EQ(priors.scan_shared_in("supine"), 0.1);
+  EXPECT_EQ(tilt.registration_mm, defaults.known.registration_mm);
+  EXPECT_DOUBLE_EQ(tilt.registration_rad, 3 * degree);
+  EXPECT_EQ(tilt.gravity_rad, defaults.known.gravity_rad);
+  EXPECT_EQ(priors.scan_shared_in("tilt45"), defaults.scan_shared_mm);
+  EXPECT_EQ(priors.known.segmentation_mm, 0.2);
+  const diagnosis::Priors said = case_priors(c, {.registration_mm = 1, .segmentation_mm = 0.6, .chest_wall_mm = 2});
+  for (const char* pose : {"supine", "tilt45"}) {
+    EXPECT_EQ(said.known_in(pose).registration_mm, 1) << "the command line overrules the case";
+    EXPECT_DOUBLE_EQ(said.known_in(pose).registration_rad, 0.75 * degree);
+    EXPECT_EQ(said.known_in(pose).chest_wall_mm, 2);
+  }
+  EXPECT_EQ(said.known.segmentation_mm, 0.6);
+}
 
 TEST_F(CaseFile, EveryKeyArrives) {
   const Case c = read(good);
@@ -193,6 +223,19 @@ INSTANTIATE_TEST_SUITE_P(
         BadCase{"PoseNamedLikeAFile", "[pose.tilt45]", "[pose.undeformed]", {"undeformed", "another"}},
         BadCase{"ScanNotThere", "\"supine.ply\"", "\"scan.ply\"", {"surface = \"scan.ply\"", "is not there"}},
         BadCase{"ScanIsAFolder", "\"supine.ply\"", "\".\"", {"is a folder"}},
+        BadCase{"KnownNegative", "noise_mm = 0.7", "noise_mm = 0.7\nbreath_mm = -1", {"breath_mm = -1", "0 to 30"}},
+        BadCase{"KnownTooLarge",
+                "noise_mm = 0.7",
+                "noise_mm = 0.7\nregistration_deg = 90",
+                {"registration_deg = 90", "0 to 45"}},
+        BadCase{"KnownOfImagedPose",
+                "gravity = [0.0, -1.0, 0.0]",
+                "gravity = [0.0, -1.0, 0.0]\nregistration_mm = 1",
+                {"registration_mm = 1", "[pose.prone]"}},
+        BadCase{"SegmentationTooLarge",
+                "rim_mm = 8",
+                "rim_mm = 8\nsegmentation_mm = 11",
+                {"segmentation_mm = 11", "0 to 10"}},
         BadCase{"NoiseNotPositive", "noise_mm = 0.7", "noise_mm = -0.7", {"noise_mm = -0.7", "> 0 mm"}},
         BadCase{"LandmarksWithoutProne", "prone = \"prone_landmarks.csv\"", "", {"[pose.supine] landmarks", "prone"}},
         BadCase{"CalibratedPoseUnknown", "poses = [\"supine\"]", "poses = [\"upright\"]", {"poses", "[pose.upright]"}},

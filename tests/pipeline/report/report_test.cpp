@@ -129,7 +129,7 @@ TEST(ReportPolydata, SaysWhatIsWrongWithAFile) {
 Case measured_case() {
   Case measured;
   measured.name = "patient";
-  measured.poses = {{"prone", {0, -1, 0}, {}, {}, {}}, {"supine", {0, 1, 0}, "supine.ply", 0.7, {}}};
+  measured.poses = {{"prone", {0, -1, 0}, {}, {}, {}, {}}, {"supine", {0, 1, 0}, "supine.ply", 0.7, {}, {}}};
   return measured;
 }
 
