@@ -18,10 +18,11 @@ namespace {
 
 using calibration::Residuals;
 
-constexpr double order_doubt = 0.8;          // of the change that quadratic elements make
+constexpr double order_doubt = 0.3;          // of the change that quadratic elements make
+constexpr double scaled_doubt = 0.8;         // of that on a coarser mesh, scaled
 constexpr double edge_share = 0.5;           // of the finer mesh's edges where skin and cut face meet
 constexpr double triangle_share = 0.8;       // of the coarser surface of a quadratic mesh
-constexpr double few_triangles_share = 0.5;  // of a linear one
+constexpr double few_triangles_share = 0.5;  // of the mesh for both orders
 
 /// A field on the corners of linear tetrahedra as one on the nodes of quadratic ones of the same shapes.
 Points on_quadratic(const meshing::TetMesh& quadratic, const Points& corners) {
@@ -49,11 +50,11 @@ simulation::ChainSolution followed(const meshing::TetMesh& quadratic, const Nume
   const auto moved = [&quadratic](const Points& from, const Points& then, const Points& now) {
     return Points(from + on_quadratic(quadratic, now - then));
   };
-  simulation::ChainSolution start = near.coarse_quadratic;
-  start.prone = moved(start.prone, near.coarse_linear.prone, linear.prone);
-  start.X = moved(start.X, near.coarse_linear.X, linear.X);
+  simulation::ChainSolution start = near.quadratic;
+  start.prone = moved(start.prone, near.linear.prone, linear.prone);
+  start.X = moved(start.X, near.linear.X, linear.X);
   for (std::size_t p = 0; p < start.poses.size(); ++p)
-    start.poses[p].x = moved(start.poses[p].x, near.coarse_linear.poses[p].x, linear.poses[p].x);
+    start.poses[p].x = moved(start.poses[p].x, near.linear.poses[p].x, linear.poses[p].x);
   return start;
 }
 
@@ -70,6 +71,19 @@ simulation::SolveOptions enough() {
 simulation::SolveOptions enough_from_near() {
   simulation::SolveOptions options = enough();
   options.smallest_load_step = 1;
+  return options;
+}
+
+/// The same without a detour.
+simulation::SolveOptions enough_straight() {
+  simulation::SolveOptions options = enough_from_near();
+  options.max_iterations = 14;
+  options.progress = [before = std::string()](const std::string& what, double, int iteration, double) mutable {
+    if (iteration > 0) return;
+    if (what == before)
+      throw NumericalFailure(what + ": quadratic elements have no equilibrium near that of the linear ones");
+    before = what;
+  };
   return options;
 }
 
@@ -112,7 +126,34 @@ void attempt(std::string& failure, Measure measure) {
   }
 }
 
-/// Fills finer_mm, coarser_mm and where they come from, for linear elements.
+/// Quadratic elements on the cells of @p mesh, from its linear solution in @p result and what was found before.
+calibration::Prediction quadratic_on(const calibration::MeasuredScene& scene, const meshing::TetMesh& mesh,
+                                     const simulation::Model& model, const NumericalError* near,
+                                     const NumericalError& result, const simulation::SolveOptions& options) {
+  const meshing::TetMesh quadratic = meshing::to_quadratic(mesh);
+  const bool followable = near != nullptr && near->quadratic.X.rows() == quadratic.points.rows();
+  const simulation::ChainSolution start =
+      followable ? followed(quadratic, *near, result.linear) : on_quadratic(quadratic, result.linear);
+  return predicted_on(scene, quadratic, model, &start, options);
+}
+
+/// Fills finer_mm, coarser_mm and where they come from by quadratic elements of the given tetrahedra.
+void measure_on_given(const calibration::MeasuredScene& scene, const simulation::Model& model,
+                      const calibration::Fit& fit, const NumericalError* near, NumericalError& result) {
+  const Eigen::VectorXd& given = fit.residuals.distance_mm;
+  result.linear = fit.prediction.solution;
+  calibration::Prediction finer = quadratic_on(scene, *scene.mesh, model, near, result, enough_straight());
+  result.finer_mm = change(given, distances_of(fit.residuals, finer));
+  result.finer_doubt = order_doubt;
+  result.quadratic = std::move(finer.solution);
+  attempt(result.coarser_failure, [&] {
+    const meshing::TetMesh mesh = coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share);
+    const calibration::Prediction coarser = predicted_on(scene, mesh, model, nullptr, enough());
+    result.coarser_mm = change(given, distances_of(fit.residuals, coarser));
+  });
+}
+
+/// The same by both orders on a coarser mesh.
 void measure_on_coarse(const calibration::MeasuredScene& scene, const simulation::Model& model,
                        const calibration::Fit& fit, const NumericalError* near, NumericalError& result) {
   const bool known = near != nullptr && near->coarse;
@@ -120,21 +161,30 @@ void measure_on_coarse(const calibration::MeasuredScene& scene, const simulation
       known ? near->coarse
             : std::make_shared<const meshing::TetMesh>(coarser_mesh(*scene.mesh, *scene.anatomy, few_triangles_share));
   calibration::Prediction linear =
-      predicted_on(scene, *result.coarse, model, known ? &near->coarse_linear : nullptr, enough());
+      predicted_on(scene, *result.coarse, model, known ? &near->linear : nullptr, enough());
   const Eigen::VectorXd given = fit.residuals.distance_mm, l = distances_of(fit.residuals, linear);
-  result.coarse_linear = std::move(linear.solution);
+  result.linear = std::move(linear.solution);
   result.coarser_mm = change(given, l);
-  const meshing::TetMesh quadratic = meshing::to_quadratic(*result.coarse);
-  const bool followable = known && near->coarse_quadratic.X.rows() == quadratic.points.rows();
-  const simulation::ChainSolution start =
-      followable ? followed(quadratic, *near, result.coarse_linear) : on_quadratic(quadratic, result.coarse_linear);
-  calibration::Prediction finer = predicted_on(scene, quadratic, model, &start, enough_from_near());
+  result.finer_doubt = scaled_doubt;
+  calibration::Prediction finer =
+      quadratic_on(scene, *result.coarse, model, known ? near : nullptr, result, enough_from_near());
   const Eigen::VectorXd order = change(l, distances_of(fit.residuals, finer));
-  result.coarse_quadratic = std::move(finer.solution);
+  result.quadratic = std::move(finer.solution);
   const double r =
       std::cbrt(static_cast<double>(result.coarse->cells.rows()) / static_cast<double>(scene.mesh->cells.rows()));
   result.finer_mm = r * order;
   result.coarser_mm = (result.coarser_mm + (1 - r) * order) / std::max(1.0, 1 / (r * r) - 1);
+}
+
+/// The same for linear elements.
+void measure_of_linear(const calibration::MeasuredScene& scene, const simulation::Model& model,
+                       const calibration::Fit& fit, const NumericalError* near, NumericalError& result) {
+  if (near == nullptr || !near->coarse) try {
+      return measure_on_given(scene, model, fit, near, result);
+    } catch (const NumericalFailure&) {
+      result = {};  // the coarser mesh then
+    }
+  measure_on_coarse(scene, model, fit, near, result);
 }
 
 /// The same for quadratic ones, on two meshes side by side.
@@ -177,11 +227,10 @@ Eigen::VectorXd share_around(const Residuals& residuals, const Eigen::VectorXd& 
 }
 
 /// Fills what follows from the two changes.
-void summarise(const calibration::MeasuredScene& scene, const calibration::Fit& fit, NumericalError& result) {
+void summarise(const calibration::Fit& fit, NumericalError& result) {
   constexpr double unknown_length_mm = 25;
   const Residuals& residuals = fit.residuals;
   const bool finer = result.finer_failure.empty(), coarser = result.coarser_failure.empty();
-  result.finer_doubt = scene.mesh->order() == 1 ? order_doubt : 1;
   if (!finer) result.finer_mm = Eigen::VectorXd::Zero(residuals.size());
   if (!coarser) result.coarser_mm = Eigen::VectorXd::Zero(residuals.size());
   const Eigen::VectorXd square =
@@ -229,11 +278,11 @@ NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, 
                                        const calibration::Fit& fit, const NumericalError* near) {
   NumericalError result;
   if (scene.mesh->order() == 1)
-    attempt(result.finer_failure, [&] { measure_on_coarse(scene, model, fit, near, result); });
+    attempt(result.finer_failure, [&] { measure_of_linear(scene, model, fit, near, result); });
   else
     measure_on_two(scene, model, fit, result);
   if (result.coarser_mm.size() == 0 && result.coarser_failure.empty()) result.coarser_failure = result.finer_failure;
-  summarise(scene, fit, result);
+  summarise(fit, result);
   return result;
 }
 

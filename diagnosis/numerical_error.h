@@ -22,9 +22,9 @@ struct NumericalError {
   /// Why a mesh gave no answer, or empty. Its column is zero then, and the spread not less than largest_share_of_way
   /// of the way to the first pose.
   std::string finer_failure, coarser_failure;
-  /// Of linear elements: the coarser mesh with linear and quadratic elements, to start the next ones from.
+  /// Of linear elements, to start the next one from: both orders on the given mesh, or on `coarse` where there is one.
   std::shared_ptr<const meshing::TetMesh> coarse;
-  simulation::ChainSolution coarse_linear, coarse_quadratic;
+  simulation::ChainSolution linear, quadratic;
 };
 
 /// Spread where it could not be measured, as a share of the way that the body has moved: as large as the largest that
@@ -34,12 +34,14 @@ inline constexpr double largest_share_of_way = 0.03;
 /// Way from the imaged pose to the first other one, rms over the nodes.
 double way_mm(const simulation::ChainSolution& solution);
 
-/// Of linear elements: nearly all of their error is in the order, and falls as the edge. A mesh of a third of the
-/// cells is solved with linear (l) and quadratic (q) elements, which takes a tenth of what quadratic elements of the
-/// given mesh take; with r the ratio of the edges, given over coarse, from the numbers of cells,
+/// Of linear elements: nearly all of their error is in the order, and falls as the edge. Quadratic ones of the same
+/// tetrahedra show it where Newton's method comes to them from the linear solution without a detour (elsewhere it may
+/// end in another equilibrium, folds of thin skin); beside them a coarser surface (other_mesh.h).
+/// Else a mesh of a third of the cells is solved with linear (l) and quadratic (q) elements, which stay together and
+/// take a tenth of the time; with r the ratio of the edges, given over coarse, from the numbers of cells,
 ///   finer = r (q − l),   coarser = (l − given + (1 − r)(q − l)) / max(1, r⁻² − 1),
 /// the latter what is left of the change between the two linear ones: the surface, of second order.
-/// Of quadratic ones: a mesh refined at the skin's end, and one on a coarser surface (other_mesh.h).
+/// Of quadratic ones: a mesh refined at the skin's end, and one on a coarser surface.
 /// @param near  of the same scene and a similar model, to start from; or nullptr
 NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, const simulation::Model& model,
                                        const calibration::Fit& fit, const NumericalError* near = nullptr);

@@ -58,12 +58,15 @@ double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t
 }
 
 void lower_unfollowed(std::vector<Hypothesis>& hypotheses) {
-  double fall = std::numeric_limits<double>::infinity();
-  for (const Hypothesis& h : hypotheses)
+  double fall = std::numeric_limits<double>::infinity(), nothing = -fall;
+  for (const Hypothesis& h : hypotheses) {
     if (h.refitted) fall = std::min(fall, h.screened - h.ln_evidence);
+    if (h.effects.empty()) nothing = h.ln_evidence;
+  }
   if (!std::isfinite(fall)) return;
   for (Hypothesis& h : hypotheses)
-    if (!h.refitted && !h.effects.empty()) h.ln_evidence = h.screened - std::max(fall, 0.0);
+    if (!h.refitted && !h.effects.empty())
+      h.ln_evidence = std::max(h.screened - std::max(fall, 0.0), std::min(h.screened, nothing));
 }
 
 void normalise(std::vector<Hypothesis>& hypotheses) {
