@@ -8,6 +8,7 @@
 #include "calibration/free_parameters.h"
 #include "common/error.h"
 #include "common/rms.h"
+#include "diagnosis/other_mesh.h"
 #include "tests/calibration/twin.h"
 
 namespace supine::diagnosis {
@@ -72,9 +73,28 @@ TEST(NumericalError, TakesAwayWhatLinearElementsErrAndSaysWhatIsLeft) {
   const Eigen::VectorXd& d = f.fit.residuals.distance_mm;
   ASSERT_GT(rms(d), 0.2) << "linear elements err";
   const double left = rms(d + error.finer_mm);
+  EXPECT_LT(left, 0.2 * rms(d));
+  EXPECT_GT(error.spread_mm, 0.6 * left);
+  EXPECT_LT(error.spread_mm, rms(d));
+}
+
+TEST(NumericalError, BothOrdersOnACoarserMeshTakeAwayHalfOfIt) {
+  const LinearOfQuadratic f;
+  NumericalError near;  // as if quadratic elements of the given mesh had led nowhere
+  near.coarse = std::make_shared<const meshing::TetMesh>(coarser_mesh(*f.scene.mesh, *f.scene.anatomy, 0.5));
+  const meshing::Anatomy anatomy = meshing::compute_anatomy(*near.coarse, f.scene.anatomy->side);
+  calibration::MeasuredScene scene = f.scene;
+  scene.mesh = near.coarse.get();
+  scene.anatomy = &anatomy;
+  near.linear = calibration::Evaluator(scene, twin_truth()).predict(twin_truth(), nullptr).solution;
+  const NumericalError error = measure_numerical_error(f.scene, twin_truth(), f.fit, &near);
+  EXPECT_EQ(error.coarse, near.coarse);
+  EXPECT_EQ(error.finer_failure + error.coarser_failure, "");
+  const Eigen::VectorXd& d = f.fit.residuals.distance_mm;
+  const double left = rms(d + error.finer_mm);
   EXPECT_LT(left, 0.6 * rms(d));
   EXPECT_GT(error.spread_mm, 0.6 * left);
-  EXPECT_LT(error.spread_mm, 3 * left);
+  EXPECT_LT(error.spread_mm, 1.5 * rms(d));
 }
 
 TEST(NumericalError, DoesNotDependOnWhereTheSolutionIsLookedForFrom) {
