@@ -10,6 +10,7 @@
 #include "pipeline/results/diagnosis_report.h"
 #include "pipeline/results/ladder_report.h"
 #include "simulation/parameters.h"
+#include "simulation/solve/equilibrium.h"
 
 namespace supine::pipeline {
 namespace {
@@ -76,7 +77,7 @@ class DiagnoseTool : public Tool {
     run.stage("read");
     check_model_target(run);
     announce_png(run, png_, folder() / "diagnosis.vtp");
-    const auto measured = read_measured_case(run, case_folder_, mesh_file_, model());
+    const auto measured = read_case_to_diagnose(run);
     calibration::Evaluator evaluator(measured->whole_scene(), measured->model);
     const std::vector<double> noise = measured->noise_mm(evaluator);
     run.stage("examine");
@@ -109,6 +110,22 @@ class DiagnoseTool : public Tool {
   }
 
  private:
+  /// With the calibrated model, or where that carries the body no more, as a fit to a scan out of place may end, with
+  /// the case's own.
+  std::unique_ptr<MeasuredCase> read_case_to_diagnose(Run& run) const {
+    const fs::path calibrated = model(), own = case_folder_ / "model.toml";
+    try {
+      return read_measured_case(run, case_folder_, mesh_file_, calibrated);
+    } catch (const simulation::NoEquilibrium& failure) {
+      if (!fs::exists(own) || fs::equivalent(own, calibrated) ||
+          simulation::free_parameters(read_model(own)) != simulation::free_parameters(read_model(calibrated)))
+        throw;
+      run.warn(fmt::format("{} has no equilibrium, the fit begins with {} instead ({})", calibrated.string(),
+                           own.string(), failure.what()));
+      return read_measured_case(run, case_folder_, mesh_file_, own);
+    }
+  }
+
   /// Where priors stand: the case's own model where it has the same effects, else the calibrated one.
   simulation::Model given_model(Run& run, const MeasuredCase& measured) const {
     const fs::path file = case_folder_ / "model.toml";

@@ -18,16 +18,12 @@ class DiagnoseTool : public testing::Test {
  protected:
   void SetUp() override { run_process({"cp", "-a", small_run().string(), case_.string()}); }
 
-  Finished diagnose(const std::vector<std::string>& more) const {
-    std::vector<std::string> words = {tool("diagnose"),
-                                      case_.string(),
-                                      (case_ / "out/mesh.vtu").string(),
-                                      "--model",
-                                      (case_ / "model.toml").string(),
-                                      "-o",
-                                      found_.string(),
-                                      "--refit",
-                                      "1"};
+  Finished diagnose(const std::vector<std::string>& more) const { return diagnose(case_ / "model.toml", more); }
+
+  Finished diagnose(const fs::path& model, const std::vector<std::string>& more) const {
+    std::vector<std::string> words = {tool("diagnose"), case_.string(), (case_ / "out/mesh.vtu").string(),
+                                      "--model",        model.string(), "-o",
+                                      found_.string(),  "--refit",      "1"};
     words.insert(words.end(), more.begin(), more.end());
     return run_process(words);
   }
@@ -48,10 +44,20 @@ TEST_F(DiagnoseTool, TellsEveryStepItBegins) {
   }
 }
 
+TEST_F(DiagnoseTool, BeginsWithTheCasesOwnModelWhereTheCalibratedOneCarriesNoMore) {
+  const fs::path soft = case_ / "soft.toml";
+  const std::string text = read_text(case_ / "model.toml"), stiff = "value = 2.0, prior_sd = 1.0, lower = 0.1";
+  ASSERT_NE(text.find(stiff), std::string::npos) << text;
+  write_text(soft, replaced(text, stiff, "value = 0.02, prior_sd = 1.0, lower = 0.01"));
+  const Finished finished = diagnose(soft, {"--no-other-meshes"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  EXPECT_NE(finished.err.find("soft.toml has no equilibrium, the fit begins with"), std::string::npos) << finished.err;
+}
+
 TEST_F(DiagnoseTool, WarnsWhereTheMeshIsTakenToBeExact) {
   const Finished finished = diagnose({"--no-other-meshes"});
   ASSERT_EQ(finished.code, 0) << finished.err;
-  EXPECT_NE(finished.err.find("the mesh is taken to be exact (not asked for)"), std::string::npos) << finished.err;
+  EXPECT_NE(finished.err.find("the mesh is taken to be exact (--no-other-meshes)"), std::string::npos) << finished.err;
   const Json json = Json::parse(std::ifstream(found_ / "diagnosis.json"));
   EXPECT_NE(json["warnings"].dump().find("taken to be exact"), std::string::npos) << json["warnings"];
 }
