@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "common/error.h"
 #include "pipeline/case/case_priors.h"
@@ -53,7 +54,7 @@ class DiagnoseTool : public Tool {
         ->check(CLI::Range(0, 100))
         ->capture_default_str();
     app.add_flag("--no-other-meshes", no_other_meshes_,
-                 "do not solve on two other meshes: the mesh is then taken to be exact");
+                 "do not solve on other meshes: the mesh is then taken to be exact");
     app.add_option("--registration-mm", known_.registration_mm,
                    "how well each scan's place is known, 1 sigma per direction, mm; its turn goes with it, 0.75 "
                    "degrees per mm (default: registration_mm of the case, else 2). 0.3 where markers were used")
@@ -117,21 +118,27 @@ class DiagnoseTool : public Tool {
     try {
       return read_measured_case(run, case_folder_, mesh_file_, calibrated);
     } catch (const simulation::NoEquilibrium& failure) {
-      if (!fs::exists(own) || fs::equivalent(own, calibrated) ||
-          simulation::free_parameters(read_model(own)) != simulation::free_parameters(read_model(calibrated)))
-        throw;
+      if (!own_model(read_model(calibrated)) || fs::equivalent(own, calibrated)) throw;
       run.warn(fmt::format("{} has no equilibrium, the fit begins with {} instead ({})", calibrated.string(),
                            own.string(), failure.what()));
       return read_measured_case(run, case_folder_, mesh_file_, own);
     }
   }
 
-  /// Where priors stand: the case's own model where it has the same effects, else the calibrated one.
-  simulation::Model given_model(Run& run, const MeasuredCase& measured) const {
+  /// The case's own model, where it has the same free numbers.
+  std::optional<simulation::Model> own_model(const simulation::Model& calibrated) const {
     const fs::path file = case_folder_ / "model.toml";
-    if (!fs::exists(file)) return measured.model;
-    const simulation::Model own = read_model(run.input(file));
-    return simulation::free_parameters(own) == simulation::free_parameters(measured.model) ? own : measured.model;
+    if (!fs::exists(file)) return std::nullopt;
+    const simulation::Model own = read_model(file);
+    if (simulation::free_parameters(own) != simulation::free_parameters(calibrated)) return std::nullopt;
+    return own;
+  }
+
+  /// Where priors stand: the case's own model where it has the same free numbers, else the calibrated one.
+  simulation::Model given_model(Run& run, const MeasuredCase& measured) const {
+    const auto own = own_model(measured.model);
+    if (own) run.input(case_folder_ / "model.toml");
+    return own.value_or(measured.model);
   }
 
   fs::path model() const {

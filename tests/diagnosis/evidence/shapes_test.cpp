@@ -4,6 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <map>
 
 #include "diagnosis/evidence/discrepancy.h"
 #include "diagnosis/evidence/nuisances.h"
@@ -54,6 +55,20 @@ TEST(Nuisances, ShapesAreTheSlopesOfTheModelThatCarriesThem) {
     EXPECT_GT(slope.norm(), 1e-3) << name;
     EXPECT_LT((slope - of->shape_mm).norm(), 0.02 * slope.norm()) << name;
   }
+}
+
+TEST(Nuisances, AreAsWideInAPoseAsWasSaidOfIt) {
+  Priors priors;
+  priors.of_pose["supine"] = {priors.known, priors.scan_shared_mm};
+  priors.of_pose["supine"].known.registration_mm = 0.4;
+  priors.of_pose["supine"].known.gravity_rad = 0;
+  std::map<std::string, double> sigma;
+  for (const Nuisance& n : nuisances_of(supine::testing::twin_truth(), {"prone", "supine", "tilt45"}, priors))
+    sigma[n.name()] = n.sigma;
+  EXPECT_EQ(sigma.at("supine/misregistration.shift_x_mm"), 0.4);
+  EXPECT_EQ(sigma.at("tilt45/misregistration.shift_x_mm"), priors.known.registration_mm);
+  EXPECT_FALSE(sigma.contains("supine/gravity_tilt.roll_rad")) << "known exactly";
+  EXPECT_EQ(sigma.at("tilt45/gravity_tilt.roll_rad"), priors.known.gravity_rad);
 }
 
 TEST(Nuisances, WhatTheModelFitsOrHasAsAnEffectIsNotThereTwice) {
