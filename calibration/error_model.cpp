@@ -80,7 +80,8 @@ class Ratings {
   std::set<std::pair<double, double>> known_;
 };
 
-/// Each point joins the first centre within the radius, or becomes one; in the order of place.
+/// Each point joins the first centre within the radius, or becomes one; in the order of place. Rows of landmarks become
+/// one each, after the points.
 Clusters clusters_of(const Residuals& residuals, const std::vector<int>& order, double radius_mm) {
   Clusters clusters;
   clusters.of_point.resize(residuals.size());
@@ -93,10 +94,16 @@ Clusters clusters_of(const Residuals& residuals, const std::vector<int>& order, 
     if (c == centres.size()) centres.push_back(row);
     clusters.of_point[row] = static_cast<int>(c);
   }
+  for (Eigen::Index row = residuals.skin_rows(); row < residuals.size(); ++row) {
+    clusters.of_point[row] = static_cast<int>(centres.size());
+    centres.push_back(static_cast<int>(row));
+  }
   const auto count = static_cast<Eigen::Index>(centres.size());
   clusters.members = Eigen::VectorXd::Zero(count);
   for (const int c : clusters.of_point) ++clusters.members[c];
   clusters.pose = residuals.pose(centres);
+  clusters.kind.resize(count);
+  for (Eigen::Index c = 0; c < count; ++c) clusters.kind[c] = residuals.kind(centres[static_cast<std::size_t>(c)]);
   clusters.place = clusters.means(residuals.place);
   return clusters;
 }
@@ -138,10 +145,12 @@ Eigen::MatrixXd Clusters::means(const Eigen::MatrixXd& columns) const {
 }
 
 Clusters cluster_points(const Residuals& residuals, Eigen::Index most) {
-  const std::vector<int> order = order_by_place(residuals);
+  std::vector<int> order = order_by_place(residuals);
+  std::erase_if(order, [&residuals](int row) { return residuals.is_landmark(row); });
   double radius_mm = cluster_radius_mm;
   Clusters clusters = clusters_of(residuals, order, radius_mm);
-  while (clusters.members.size() > most) clusters = clusters_of(residuals, order, radius_mm *= 1.2);
+  while (clusters.members.size() - residuals.landmark_rows > most)
+    clusters = clusters_of(residuals, order, radius_mm *= 1.2);
   return clusters;
 }
 

@@ -14,15 +14,18 @@ namespace supine::calibration {
 struct Clusters {
   Points place;              ///< #C by 3, means
   Eigen::VectorXi pose;      ///< #C
+  Eigen::VectorXi kind;      ///< #C, Residuals::kind
   Eigen::VectorXd members;   ///< #C, points in each
   Eigen::VectorXi of_point;  ///< #R
 
   /// Means of columns over the points, #C rows.
   Eigen::MatrixXd means(const Eigen::MatrixXd& columns) const;
+  /// Whether errors of two may go together: of one pose, both of skin or both along one axis.
+  bool related(Eigen::Index a, Eigen::Index b) const { return pose[a] == pose[b] && kind[a] == kind[b]; }
 };
 
-/// Clusters of 4 mm radius, or as much larger as it takes to have at most @p most of them. Does not depend on the order
-/// of the points.
+/// Clusters of 4 mm radius, or as much larger as it takes to have at most @p most of them; then each row of a landmark
+/// by itself. Does not depend on the order of the points.
 Clusters cluster_points(const Residuals& residuals, Eigen::Index most);
 
 /// How the errors that are left after a fit go together: noise of single points, and an error of model and mesh that

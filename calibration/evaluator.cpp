@@ -51,7 +51,13 @@ std::vector<double> Prediction::scan_distances() const {
 
 Evaluator::Evaluator(MeasuredScene scene, const simulation::Model& model, const simulation::SolveOptions& options)
     : scene_(std::move(scene)), chain_(*scene_.mesh, *scene_.anatomy, model, loads_of(scene_), options) {
-  for (std::size_t m = 0; m < scene_.measurements.size(); ++m) skins_.emplace_back(*scene_.mesh, scene_.mesh->points);
+  scene_.landmarks.resize(scene_.measurements.size(), nullptr);
+  for (std::size_t m = 0; m < scene_.measurements.size(); ++m) {
+    skins_.emplace_back(*scene_.mesh, scene_.mesh->points);
+    landmarks_.push_back(scene_.landmarks[m] == nullptr ? nullptr
+                                                        : std::make_shared<const simulation::Embedding>(
+                                                              *scene_.mesh, scene_.landmarks[m]->imaged));
+  }
 }
 
 Prediction Evaluator::predict(const simulation::Model& model, const simulation::ChainSolution* near) {
@@ -69,6 +75,9 @@ Prediction Evaluator::predict(const simulation::Model& model, const simulation::
     model_to_scan(scan, motion.as_given(skins_[m].node_points()), motion.directions_as_given(skins_[m].node_normals()),
                   {}, pose.to_scan);
     leave_out(scene_.measurements[m]->left_out, pose);
+    if (landmarks_[m])
+      pose.landmarks = {motion.corrected(scene_.landmarks[m]->measured),
+                        landmarks_[m]->at(prediction.solution.poses[m].x), landmarks_[m]};
   }
   return prediction;
 }
@@ -83,7 +92,8 @@ Eigen::VectorXd Evaluator::distance_derivative(const simulation::Model& model, c
   const auto fields = chain_.fields(model, scene_.measurements[pose]->pose, parameter);
   Points scan = Points::Zero(unit.rows(), 3);
   if (!simulation::derivatives_of(fields).scan_motion.isZero(0))
-    scan = corrected_derivative(fields.scan_motion, scene_.measurements[pose]->scan.points());
+    scan = corrected_derivative(fields.scan_motion, scene_.measurements[pose]->scan.points(),
+                                scene_.measurements[pose]->scan.points());
   Eigen::VectorXd slope(unit.rows());
   for (Eigen::Index i = 0; i < unit.rows(); ++i) {
     Eigen::RowVector3d moved = scan.row(i);
@@ -91,6 +101,16 @@ Eigen::VectorXd Evaluator::distance_derivative(const simulation::Model& model, c
     slope[i] = moved.dot(unit.row(i));
   }
   return slope;
+}
+
+Points Evaluator::landmark_derivative(const simulation::Model& model, const Prediction& prediction, std::size_t pose,
+                                      const std::string& parameter, const simulation::ChainDerivative& derivative) {
+  Points moved = -prediction.poses[pose].landmarks.in->at(derivative.poses[pose]);
+  const auto fields = chain_.fields(model, scene_.measurements[pose]->pose, parameter);
+  if (!simulation::derivatives_of(fields).scan_motion.isZero(0))
+    moved += corrected_derivative(fields.scan_motion, scene_.measurements[pose]->scan.points(),
+                                  scene_.landmarks[pose]->measured);
+  return moved;
 }
 
 simulation::ChainSolution extrapolated(const simulation::ChainSolution& solution,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,10 +12,18 @@
 #include "calibration/scan.h"
 #include "calibration/scan_motion.h"
 #include "calibration/signed_distance.h"
+#include "simulation/embedding.h"
 #include "simulation/solve/chain.h"
 #include "simulation/solve/sensitivities.h"
 
 namespace supine::calibration {
+
+/// Points of the tissue whose places were measured in the imaged pose and in another; #L by 3, mm.
+struct MeasuredLandmarks {
+  std::vector<std::string> names;
+  Points imaged, measured;
+  Eigen::VectorXd sigma_mm;  ///< of both places together, 1 sigma along each axis, > 0
+};
 
 /// A measured surface and the pose it was measured in.
 struct Measurement {
@@ -30,6 +39,15 @@ struct MeasuredScene {
   const meshing::Anatomy* anatomy;
   simulation::PoseLoad prone;
   std::vector<const Measurement*> measurements;  ///< those that are fitted, or looked at; one or more
+  /// Measured with them, by measurement; nullptr where there are none. Shorter where the last ones have none.
+  std::vector<const MeasuredLandmarks*> landmarks = {};
+};
+
+/// The landmarks of one measured pose as a model predicts them, #L by 3, mm.
+struct LandmarkPrediction {
+  Points measured;                                  ///< as the model says they lie (ScanMotion of their scan)
+  Points predicted;                                 ///< carried along by the tissue
+  std::shared_ptr<const simulation::Embedding> in;  ///< the mesh; nullptr without landmarks
 };
 
 /// One measured pose as a model predicts it.
@@ -37,6 +55,7 @@ struct PosePrediction {
   Points scan_points;         ///< as the model says they lie (ScanMotion), #P by 3
   SignedDistances distances;  ///< of them to the model's skin
   ModelToScan to_scan;        ///< of the skin's points to the scan
+  LandmarkPrediction landmarks;
 };
 
 /// One model's prediction of everything measured, in the order of MeasuredScene::measurements.
@@ -65,6 +84,9 @@ class Evaluator {
   /// @param derivative  of the chain with respect to the parameter
   Eigen::VectorXd distance_derivative(const simulation::Model& model, const Prediction& prediction, std::size_t pose,
                                       const std::string& parameter, const simulation::ChainDerivative& derivative);
+  /// ∂(measured − predicted)/∂(parameter) of the landmarks of one measurement, #L by 3.
+  Points landmark_derivative(const simulation::Model& model, const Prediction& prediction, std::size_t pose,
+                             const std::string& parameter, const simulation::ChainDerivative& derivative);
 
   simulation::Chain& chain() { return chain_; }
   const MeasuredScene& scene() const { return scene_; }
@@ -73,6 +95,7 @@ class Evaluator {
   MeasuredScene scene_;
   simulation::Chain chain_;
   std::vector<ModelSkin> skins_;
+  std::vector<std::shared_ptr<const simulation::Embedding>> landmarks_;  // by measurement
 };
 
 /// The solution moved by first-order steps of the parameters: where to start looking for the next one.

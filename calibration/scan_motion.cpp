@@ -33,13 +33,14 @@ Points ScanMotion::directions_as_given(const Points& directions) const {
   return directions * rotation_.transpose();
 }
 
-Points corrected_derivative(const simulation::Fields<simulation::Dual>::Column& motion, const Points& scan) {
+Points corrected_derivative(const simulation::Fields<simulation::Dual>::Column& motion, const Points& scan,
+                            const Points& points) {
   using simulation::Dual;
   const Eigen::RowVector3d centre = scan.colwise().mean();
   const Dual back[3] = {-motion[3], -motion[4], -motion[5]};
-  Points derivative(scan.rows(), 3);
-  for (Eigen::Index i = 0; i < scan.rows(); ++i) {
-    const Eigen::RowVector3d arm = scan.row(i) - centre;
+  Points derivative(points.rows(), 3);
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    const Eigen::RowVector3d arm = points.row(i) - centre;
     const Dual from[3] = {Dual(arm[0]), Dual(arm[1]), Dual(arm[2])};
     Dual to[3];
     ceres::AngleAxisRotatePoint(back, from, to);

@@ -28,8 +28,10 @@ class ScanMotion {
   bool none_;
 };
 
-/// Derivative of ScanMotion::corrected() with respect to the parameter that @p motion carries the derivative of;
-/// #P by 3, mm per unit.
-Points corrected_derivative(const simulation::Fields<simulation::Dual>::Column& motion, const Points& scan);
+/// Derivative of ScanMotion::corrected() of points that were measured with a scan, with respect to the parameter that
+/// @p motion carries the derivative of; #P by 3, mm per unit.
+/// @param scan  all points of the scan as given: their centroid is what is turned about
+Points corrected_derivative(const simulation::Fields<simulation::Dual>::Column& motion, const Points& scan,
+                            const Points& points);
 
 }  // namespace supine::calibration

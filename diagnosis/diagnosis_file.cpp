@@ -35,16 +35,17 @@ void write_diagnosis(const calibration::Residuals& residuals, const std::vector<
   vtkNew<vtkPoints> places;
   places->SetDataTypeToDouble();
   vtkNew<vtkCellArray> cells;
-  for (vtkIdType i = 0; i < residuals.size(); ++i) {
+  for (vtkIdType i = 0; i < residuals.skin_rows(); ++i) {
     places->InsertNextPoint(residuals.place.row(i).data());
     cells->InsertNextCell(1, &i);
   }
   poly->SetPoints(places);
   poly->SetVerts(cells);
-  add_numbers(*poly, "distance_mm", residuals.distance_mm);
+  add_numbers(*poly, "distance_mm", residuals.skin_mm());
   poly->GetPointData()->SetActiveScalars("distance_mm");
-  add_integers(*poly, "pose", {residuals.pose.begin(), residuals.pose.end()});
-  for (const auto& [effect, shape] : shapes) add_numbers(*poly, "shape_" + effect + "_mm", shape);
+  add_integers(*poly, "pose", {residuals.pose.begin(), residuals.pose.begin() + residuals.skin_rows()});
+  for (const auto& [effect, shape] : shapes)
+    add_numbers(*poly, "shape_" + effect + "_mm", shape.head(residuals.skin_rows()));
   if (forces != nullptr) {
     add_vectors(*poly, "missing_force_kpa", forces->force_kpa);
     add_vectors(*poly, "missing_force_null_kpa", forces->null_kpa);

@@ -43,7 +43,7 @@ ErrorBudget error_budget(const Findings& found) {
   const std::set<std::string> measured = of_measurement(found.base);
   ErrorBudget budget;
   budget.total = found.rms_mm;
-  budget.noise = rms(found.base.noise_of_point_mm);
+  budget.noise = rms(found.base.noise_of_point_mm.head(found.base.fit.residuals.skin_rows()));
   budget.registration = doubt_of(h, [&](const std::string& name) { return measured.contains(name); });
   budget.parameters = doubt_of(h, [&](const std::string& name) { return !measured.contains(name); });
   if (found.base.numerical) budget.numerical = found.base.numerical->spread_mm;

@@ -131,11 +131,11 @@ Unexplained summary(std::vector<double> draws) {
   return {sum / static_cast<double>(draws.size()), quantile(draws, 0.025), quantile(draws, 0.975)};
 }
 
-/// RMS of draws of the discrepancy over the fitted points, in each of the likeliest hypotheses and over all.
+/// RMS of draws of the discrepancy over the fitted points of skin, in each of the likeliest hypotheses and over all.
 void find_unexplained(unsigned seed, Findings& found) {
   constexpr int draws = 200;
   std::mt19937_64 generator(seed);
-  const VectorXd& members = found.base.clusters.members;
+  const VectorXd members = (found.base.clusters.kind.array() == 0).select(found.base.clusters.members, 0.0);
   const auto draw = [&](const Hypothesis& h) {
     const VectorXd field = h.evidence->draw_discrepancy(h.rows, h.weighed, generator);
     return std::sqrt(field.cwiseAbs2().dot(members) / members.sum());
@@ -225,7 +225,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   found->base = fit_base_model(evaluator, subject.given, subject.start, subject.noise_mm, subject.near,
                                {options.priors, options.other_meshes, options.progress});
   const calibration::Fit& fit = found->base.fit;
-  found->rms_mm = rms(fit.residuals.distance_mm);
+  found->rms_mm = rms(fit.residuals.skin_mm());
   tell(options, "catalogue");
   found->errors.emplace(found->base, found->base.nuisances, found->base.size_mm);
   found->candidates = find_candidates(evaluator, found->base.model, fit, found->unseen);

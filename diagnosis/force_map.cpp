@@ -109,7 +109,7 @@ ForceMap force_map(const calibration::MeasuredScene& scene, const simulation::Mo
   const auto freed = [&](const MatrixXd& a) -> MatrixXd { return a - absorbed * solver.solve(a); };
   const Evidence evidence(freed(metric.whitening->apply(slopes(scene, model, f, centres, width, 0))));
   const VectorXd d = freed(metric.whitening->apply(f.residuals.distance_mm + metric.mean_mm));
-  const MatrixXd weight = gaussian_kernel(f.residuals.place, centres, width);
+  const MatrixXd weight = gaussian_kernel(f.residuals.place.topRows(f.residuals.skin_rows()), centres, width);
   ForceMap map;
   std::tie(map.evidence_gain, map.amplitude_kpa) = evidence.best(d);
   map.force_kpa = field(weight, evidence.coefficients(d, map.amplitude_kpa));

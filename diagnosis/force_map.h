@@ -12,7 +12,7 @@ namespace supine::diagnosis {
 /// that the model does not have, and no more than that. A stiffness that is wrong inside, or a scan that lies
 /// elsewhere, is turned into forces as well.
 struct ForceMap {
-  Points force_kpa;          ///< #R by 3, at the residuals' points; per deformed area, LPS
+  Points force_kpa;          ///< #R by 3, at the residuals' scan points; per deformed area, LPS
   Points null_kpa;           ///< the same of one simulated measurement of a model that lacks nothing
   double threshold_kpa = 0;  ///< 95 of 100 such measurements have nothing larger anywhere
   double evidence_gain = 0;  ///< ln evidence over "no forces", at the amplitude that makes most of it

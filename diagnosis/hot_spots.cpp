@@ -78,7 +78,7 @@ SkinError skin_error(const calibration::ModelSkin& skin, const calibration::Resi
   const Eigen::Index nodes = skin.distance().points().rows();
   Sums sums{Eigen::VectorXd::Zero(nodes), Eigen::VectorXd::Zero(nodes), Eigen::VectorXd::Zero(nodes)};
   const auto& closest = prediction.poses[pose].distances.closest;
-  for (Eigen::Index r = 0; r < residuals.size(); ++r) {
+  for (Eigen::Index r = 0; r < residuals.skin_rows(); ++r) {
     if (residuals.pose[r] != static_cast<int>(pose)) continue;
     const int point = residuals.point[r];
     for (int k = 0; k < 3; ++k) {

@@ -13,11 +13,11 @@ namespace supine::diagnosis {
 namespace {
 
 RungFigures figures_of(const Findings& found, const std::string& added) {
-  return {added, found.base.fit.residuals.distance_mm.cwiseAbs().mean(), found.rms_mm, found.held_out_rms_mm};
+  return {added, found.base.fit.residuals.skin_mm().cwiseAbs().mean(), found.rms_mm, found.held_out_rms_mm};
 }
 
 RungFigures figures_of(const Refit& refit) {
-  return {refit.effects[0], refit.fit.residuals.distance_mm.cwiseAbs().mean(), refit.rms_mm, refit.held_out_rms_mm};
+  return {refit.effects[0], refit.fit.residuals.skin_mm().cwiseAbs().mean(), refit.rms_mm, refit.held_out_rms_mm};
 }
 
 Rung rung_of(const Findings& found, const std::string& added, double probability) {

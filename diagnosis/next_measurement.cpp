@@ -83,7 +83,7 @@ class Pose {
     const auto fields = chain_.fields(found_.base.model, load_, parameter);
     Points moved = Points::Zero(place_.rows(), 3);
     if (!simulation::derivatives_of(fields).scan_motion.isZero(0))
-      moved = calibration::corrected_derivative(fields.scan_motion, place_);
+      moved = calibration::corrected_derivative(fields.scan_motion, place_, place_);
     moved -= derivative.poses[0](nodes_, Eigen::all);
     return moved.cwiseProduct(normal_).rowwise().sum();
   }
@@ -93,8 +93,9 @@ class Pose {
   void factorise() {
     const Eigen::Index n = place_.rows();
     const auto scans = found_.base.fit.prediction.poses.size();
-    const double points = static_cast<double>(found_.base.fit.residuals.size()) / static_cast<double>(scans * n);
-    const double nugget = mean_square(found_.base.noise_of_point_mm) / std::max(1.0, points);
+    const double points = static_cast<double>(found_.base.fit.residuals.skin_rows()) / static_cast<double>(scans * n);
+    const double nugget =
+        mean_square(found_.base.noise_of_point_mm.head(found_.base.fit.residuals.skin_rows())) / std::max(1.0, points);
     const auto& mesh = found_.base.numerical;
     const double shared = mesh ? mesh->spread_mm * mesh->spread_mm : 0, length_mm = mesh ? mesh->length_mm : 1;
     Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(n, n);

@@ -104,8 +104,13 @@ calibration::Prediction predicted_on(const calibration::MeasuredScene& scene, co
 Eigen::VectorXd distances_of(const Residuals& residuals, const calibration::Prediction& prediction) {
   Eigen::VectorXd there(residuals.size());
   for (Eigen::Index r = 0; r < residuals.size(); ++r) {
-    const auto& distances = prediction.poses[static_cast<std::size_t>(residuals.pose[r])].distances;
+    const auto& [scan_points, distances, to_scan, landmarks] =
+        prediction.poses[static_cast<std::size_t>(residuals.pose[r])];
     const int point = residuals.point[r];
+    if (residuals.is_landmark(r)) {
+      there[r] = landmarks.measured(point / 3, point % 3) - landmarks.predicted(point / 3, point % 3);
+      continue;
+    }
     there[r] = distances.closest.on_border[point] ? std::nan("") : distances.distance_mm[point];
   }
   return there;
@@ -263,7 +268,7 @@ double correlation_length_mm(const Residuals& residuals, const Eigen::VectorXd& 
   for (Eigen::Index i = 0; i < x.size(); ++i)
     for (Eigen::Index j = 0; j < i; ++j) {
       const double r = (clusters.place.row(i) - clusters.place.row(j)).norm();
-      if (clusters.pose[i] != clusters.pose[j] || r < near_mm || r > far_mm) continue;
+      if (!clusters.related(i, j) || r < near_mm || r > far_mm) continue;
       product += x[i] * x[j];
       distance += r;
       ++count;

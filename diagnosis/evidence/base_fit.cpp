@@ -35,14 +35,14 @@ struct ScanNoise {
 };
 
 /// White is what neighbouring points show, where there are enough of them. Where that is less than the case says, the
-/// rest is taken to be shared.
+/// rest is taken to be shared. Landmarks err one by one.
 ScanNoise noise_of(const Residuals& residuals, const VectorXd& shared_mm) {
   constexpr int fewest = 200;
   ScanNoise noise{residuals.sigma_mm, shared_mm};
   for (int pose = 0; pose <= residuals.pose.maxCoeff(); ++pose) {
     std::vector<int> rows;
     for (Index r = 0; r < residuals.size(); ++r)
-      if (residuals.pose[r] == pose) rows.push_back(static_cast<int>(r));
+      if (residuals.pose[r] == pose && !residuals.is_landmark(r)) rows.push_back(static_cast<int>(r));
     if (rows.size() < fewest) continue;
     const double seen = calibration::estimate_noise_mm(residuals.place(rows, Eigen::all), residuals.distance_mm(rows));
     for (const int r : rows) {
@@ -62,7 +62,7 @@ void add_shared(const BaseFit& base, const Priors& priors, const VectorXd& share
   if (base.numerical) spread = base.numerical->spread_mm * c.means(base.numerical->share);
   for (Index i = 0; i < errors.rows(); ++i)
     for (Index j = 0; j < errors.cols(); ++j) {
-      if (c.pose[i] != c.pose[j]) continue;
+      if (!c.related(i, j)) continue;
       errors(i, j) += shared_mm[i] * shared_mm[j] * scan(i, j);
       if (base.numerical)
         errors(i, j) +=
@@ -74,9 +74,11 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
                  BaseFit& base) {
   const Residuals& residuals = base.fit.residuals;
   VectorXd shared_mm(residuals.size());
+  const auto& measurements = evaluator.scene().measurements;
   for (Index r = 0; r < shared_mm.size(); ++r)
-    shared_mm[r] =
-        priors.scan_shared_in(evaluator.scene().measurements[static_cast<std::size_t>(residuals.pose[r])]->pose.name);
+    shared_mm[r] = residuals.is_landmark(r)
+                       ? 0
+                       : priors.scan_shared_in(measurements[static_cast<std::size_t>(residuals.pose[r])]->pose.name);
   const ScanNoise noise = noise_of(residuals, shared_mm);
   base.noise_of_point_mm = noise.white_mm;
   const VectorXd variance = base.clusters.means(base.noise_of_point_mm.cwiseAbs2());

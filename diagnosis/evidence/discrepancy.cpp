@@ -83,11 +83,12 @@ Eigen::MatrixXd discrepancy_kernel(const meshing::TetMesh& mesh, const simulatio
   for (Eigen::Index i = 0; i < kernel.rows(); ++i)
     for (Eigen::Index j = 0; j < kernel.cols(); ++j)
       if (clusters.pose[i] != clusters.pose[j]) kernel(i, j) *= 0.5;
-  kernel *= (1 - share_beyond_forces) / kernel.diagonal().mean();
+  const Eigen::ArrayXd of_skin = (clusters.kind.array() == 0).cast<double>();
+  kernel *= (1 - share_beyond_forces) * of_skin.sum() / of_skin.matrix().dot(kernel.diagonal());
   const Eigen::MatrixXd plain = gaussian_kernel(clusters.place, clusters.place, length_mm);
   for (Eigen::Index i = 0; i < kernel.rows(); ++i)
     for (Eigen::Index j = 0; j < kernel.cols(); ++j)
-      if (clusters.pose[i] == clusters.pose[j]) kernel(i, j) += share_beyond_forces * plain(i, j);
+      if (clusters.related(i, j)) kernel(i, j) += share_beyond_forces * plain(i, j);
   return kernel;
 }
 

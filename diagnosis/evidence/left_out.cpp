@@ -53,7 +53,7 @@ double held_out_rms(const BaseFit& base, const Hypothesis& h, const calibration:
   }
   Eigen::VectorXd distance = residuals.distance_mm + base.mean_mm;
   for (Eigen::Index r = 0; r < distance.size(); ++r) distance[r] += change[base.clusters.of_point[r]];
-  return rms(distance);
+  return rms(distance.head(residuals.skin_rows()));
 }
 
 std::vector<LeftOut> left_out_parts(const calibration::MeasuredScene& scene, const BaseFit& base) {

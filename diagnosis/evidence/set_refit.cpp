@@ -145,7 +145,7 @@ Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& gi
   result.model = FreeParameters(model).model(result.fit.u);
   result.parameters = parameters_of(result, parameters);
   result.at_border = is_at_border(result, parameters);
-  result.rms_mm = rms(distances_at_posterior(base, h, result.fit.residuals));
+  result.rms_mm = rms(distances_at_posterior(base, h, result.fit.residuals).head(result.fit.residuals.skin_rows()));
   result.held_out_rms_mm = held_out_rms(base, h, result.fit.residuals);
   return result;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/case/measured_case.h"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,6 +13,7 @@
 #include "calibration/residuals.h"
 #include "calibration/signed_distance.h"
 #include "common/error.h"
+#include "common/landmarks.h"
 #include "meshing/mesh_io.h"
 #include "pipeline/case/model_file.h"
 #include "reconstruction/surface_io.h"
@@ -83,11 +84,51 @@ void read_scan(Run& run, MeasuredCase& in, const Pose& pose, std::size_t row) {
   list.push_back(Measurement{{pose.name, pose.gravity}, std::move(scan), pose.noise_mm, std::move(standing_out)});
 }
 
+/// 1 sigma of the difference of two places, as far as the files state it.
+double sigma_of(const Landmarks& prone, std::size_t a, const Landmarks& posed, std::size_t b) {
+  constexpr double usual_mm = 1.5;
+  const auto stated = [](const Landmarks& file, std::size_t row) {
+    return file.sigma_mm.size() > 0 ? file.sigma_mm[static_cast<Eigen::Index>(row)] : 0.0;
+  };
+  const double both = std::hypot(stated(prone, a), stated(posed, b));
+  return both > 0 ? both : usual_mm;
+}
+
+calibration::MeasuredLandmarks paired(const Landmarks& prone, const Landmarks& posed, const fs::path& file) {
+  const auto count = static_cast<Eigen::Index>(posed.names.size());
+  calibration::MeasuredLandmarks pairs{posed.names, Points(count, 3), posed.points, Eigen::VectorXd(count)};
+  for (std::size_t i = 0; i < posed.names.size(); ++i) {
+    const auto found = std::find(prone.names.begin(), prone.names.end(), posed.names[i]);
+    if (found == prone.names.end())
+      throw InputError(fmt::format(
+          "{}: landmark '{}' is not among those of [landmarks] prone ({}): it has the same name in every pose",
+          file.string(), posed.names[i], fmt::join(prone.names, ", ")));
+    const auto row = static_cast<std::size_t>(found - prone.names.begin());
+    pairs.imaged.row(static_cast<Eigen::Index>(i)) = prone.points.row(found - prone.names.begin());
+    pairs.sigma_mm[static_cast<Eigen::Index>(i)] = sigma_of(prone, row, posed, i);
+  }
+  return pairs;
+}
+
+void read_pose_landmarks(Run& run, MeasuredCase& in, const std::vector<Pose>& poses) {
+  const Case& c = in.description;
+  if (!c.prone_landmarks) return;
+  const Landmarks prone = read_landmarks(run.input(*c.prone_landmarks), c.frame);
+  for (const Pose& pose : poses)
+    if (pose.landmarks)
+      in.landmarks.emplace(pose.name,
+                           paired(prone, read_landmarks(run.input(*pose.landmarks), c.frame), *pose.landmarks));
+}
+
 calibration::MeasuredScene scene_of(const MeasuredCase& in, bool whole) {
   calibration::MeasuredScene scene{&in.mesh, &in.anatomy, {"prone", in.description.pose("prone").gravity}, {}};
   for (const Measurement& m : in.fitted) scene.measurements.push_back(&m);
   for (const Measurement& m : in.held_out)
     if (whole) scene.measurements.push_back(&m);
+  for (const Measurement* m : scene.measurements) {
+    const auto found = in.landmarks.find(m->pose.name);
+    scene.landmarks.push_back(!whole || found == in.landmarks.end() ? nullptr : &found->second);
+  }
   return scene;
 }
 
@@ -129,6 +170,7 @@ std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const fs::path& folde
   const std::vector<Pose> poses = measured_poses(in->description);
   solve_start(*in, poses);
   for (std::size_t p = 0; p < poses.size(); ++p) read_scan(run, *in, poses[p], p);
+  read_pose_landmarks(run, *in, poses);
   return in;
 }
 

@@ -3,7 +3,9 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "calibration/evaluator.h"
@@ -25,9 +27,11 @@ struct MeasuredCase {
   meshing::Anatomy anatomy;
   std::vector<calibration::Measurement> fitted;    ///< in the order of [calibration] poses
   std::vector<calibration::Measurement> held_out;  ///< every other measured pose
-  simulation::ChainSolution start;                 ///< of the model as given; poses: fitted, then held out
+  /// Of the poses that have some, by name; without sigma_mm in either file 1.5 mm.
+  std::map<std::string, calibration::MeasuredLandmarks> landmarks;
+  simulation::ChainSolution start;  ///< of the model as given; poses: fitted, then held out
 
-  /// Only what is fitted, or all of it.
+  /// Only the surfaces that are fitted, or all that is measured, landmarks included.
   calibration::MeasuredScene fitted_scene() const;
   calibration::MeasuredScene whole_scene() const;
   /// Of each measurement of a scene: as the case says, or estimated from the distances to the given model.
@@ -38,8 +42,7 @@ struct MeasuredCase {
 /// Reads and checks all of it, and solves the model as given once, because only a predicted skin tells which side of a
 /// scan is outside and whether it lies at the body.
 /// @throws InputError  a fitted pose without a surface; no interface; side = "both" without two breasts; a scan that is
-/// not at the body;
-///   effects that can change nothing
+///   not at the body; a landmark without a place in prone; effects that can change nothing
 /// @throws NumericalFailure  no equilibrium with the model as given
 std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const std::filesystem::path& folder,
                                                  const std::filesystem::path& mesh_file,

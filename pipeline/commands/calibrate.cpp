@@ -225,6 +225,7 @@ class CalibrateTool : public Tool {
     calibration::MeasuredScene scene = measured_->whole_scene();
     scene.measurements.erase(scene.measurements.begin(),
                              scene.measurements.begin() + static_cast<std::ptrdiff_t>(measured_->fitted.size()));
+    scene.landmarks.clear();
     const simulation::Model model = parameters.model(result.fit.u);
     Evaluator other(scene, model);
     simulation::ChainSolution near = result.fit.prediction.solution;

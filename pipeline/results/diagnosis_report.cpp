@@ -211,7 +211,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   for (const diagnosis::Inclusion& one : found.included)  // most probable first
     for (const Score& score : found.table.scores)
       if (score.effect == one.effect) f["candidates"].push_back(candidate_json(found, score));
-  f["base_mae_mm"] = found.base.fit.residuals.distance_mm.cwiseAbs().mean();
+  f["base_mae_mm"] = found.base.fit.residuals.skin_mm().cwiseAbs().mean();
   f["base_rms_mm"] = found.rms_mm;
   f["base_held_out_rms_mm"] = found.held_out_rms_mm;
   f["base_parameters"] = Json::object();

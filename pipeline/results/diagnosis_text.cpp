@@ -123,7 +123,7 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result) {
   run.say(
       fmt::format("  residual: MAE {:.2f} mm, RMS {:.2f}, held-out {:.2f}; scan noise {:.2f}, registration {:.2f}, "
                   "numerical {:.2f}, parameters {:.2f}, patchiness {:.2f}, unexplained {:.2f}",
-                  found.base.fit.residuals.distance_mm.cwiseAbs().mean(), b.total, found.held_out_rms_mm, b.noise,
+                  found.base.fit.residuals.skin_mm().cwiseAbs().mean(), b.total, found.held_out_rms_mm, b.noise,
                   b.registration, b.numerical, b.parameters, b.patchiness, b.model_form));
   run.say("  where:    " + where(result.hot_spots));
   say_verdict(run, found);

@@ -50,7 +50,7 @@ TEST(ScanMotion, DerivativeIsThatOfTheCorrectedPoints) {
         motion[k] += h;
         return ScanMotion(motion, scan).corrected(scan);
       };
-      EXPECT_GT(supine::testing::taylor_order(moved, corrected_derivative(dual, scan), 0.05), 1.9) << k;
+      EXPECT_GT(supine::testing::taylor_order(moved, corrected_derivative(dual, scan, scan), 0.05), 1.9) << k;
     }
 }
 
@@ -58,7 +58,7 @@ TEST(ScanMotion, ShiftMovesEveryPointAlike) {
   const Points scan = random_points(20, -40, 90, 7);
   simulation::Fields<simulation::Dual>::Column dual = some_motion().cast<simulation::Dual>();
   dual[1].v[0] = 1;
-  EXPECT_LT((corrected_derivative(dual, scan).rowwise() - Eigen::RowVector3d(0, -1, 0)).norm(), 1e-12);
+  EXPECT_LT((corrected_derivative(dual, scan, scan).rowwise() - Eigen::RowVector3d(0, -1, 0)).norm(), 1e-12);
 }
 
 }  // namespace
