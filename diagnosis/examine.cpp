@@ -243,6 +243,8 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   found->places = find_places(subject, *found);
   found->budget = error_budget(*found);
   found->diagnosis = decide(found->hypotheses, found->effects(), found->included, found->unexplained, options.priors);
+  found->under_other_priors = under_other_priors(found->base, found->hypotheses, found->effects(), found->included,
+                                                 found->unexplained, options.priors);
   if (found->diagnosis.verdict == Verdict::unexplained) {
     tell(options, "map of missing forces");
     const FitErrors known(found->base, found->base.nuisances, 0);

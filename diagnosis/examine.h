@@ -12,6 +12,7 @@
 #include "diagnosis/error_budget.h"
 #include "diagnosis/evidence/base_fit.h"
 #include "diagnosis/evidence/fit_errors.h"
+#include "diagnosis/evidence/other_priors.h"
 #include "diagnosis/evidence/set_refit.h"
 #include "diagnosis/force_map.h"
 #include "diagnosis/score_test.h"
@@ -60,6 +61,7 @@ struct Findings {
   std::vector<ScanPlace> places;
   ErrorBudget budget;
   Diagnosis diagnosis;
+  std::vector<OtherPrior> under_other_priors;  ///< the diagnosis, if something else had been believed before
   Priors priors;
   std::optional<ForceMap> forces;  ///< that would explain what is left; only when unexplained
 

@@ -17,7 +17,7 @@
 namespace supine::diagnosis {
 namespace {
 
-constexpr double seen_power = 0.5;
+constexpr double seen_power = 0.5, factor_that_settles = 3;
 
 /// A measurement that could be made: where "down" points. The fitted pose again needs no solve.
 struct Option {
@@ -235,8 +235,11 @@ void rate_unseen(const Findings& found, const std::vector<const Candidate*>& eff
 
 std::vector<std::string> not_seen(const Findings& found) {
   std::vector<std::string> effects;
+  const auto& named = found.diagnosis.missing;
   for (const Score& score : found.table.scores)
-    if (score.power < seen_power) effects.push_back(score.effect);
+    if (score.expected_ln_factor < std::log(factor_that_settles) &&
+        std::find(named.begin(), named.end(), score.effect) == named.end())
+      effects.push_back(score.effect);
   return effects;
 }
 

@@ -27,7 +27,8 @@ struct Separation {
 std::vector<Separation> next_measurements(const Subject& subject, const Findings& found,
                                           const std::vector<std::string>& set);
 
-/// Effects that this scan would rather miss than find at their usual size (power below one half).
+/// Effects that are not named and that this scan could not settle if they were there at their usual size: the Bayes
+/// factor to be expected is under 3.
 std::vector<std::string> not_seen(const Findings& found);
 
 }  // namespace supine::diagnosis

@@ -80,6 +80,8 @@ class Scorer {
     score.bic = score.statistic - score.freedom * log_points_;
     predict(candidate, score);
     score.noncentrality = expected(candidate, p);
+    const double q = std::max(score.freedom, 1);
+    score.expected_ln_factor = 0.5 * (score.noncentrality - q * std::log1p(score.noncentrality / q));
     return score;
   }
 

@@ -173,16 +173,40 @@ void read_effects(const TomlReader& file, Model& model) {
   }
 }
 
+diagnosis::Patchiness patchiness_of(const TomlReader& file) {
+  constexpr Bounds share{.lower = 0, .upper = 2}, length{.lower = 5, .upper = 200}, depth{.lower = 0, .upper = 10};
+  diagnosis::Patchiness patchiness;
+  const auto section = file.sub_table("patchiness");
+  if (!section) return patchiness;
+  const auto read = [&](const char* key, const Bounds& bounds, double& value) {
+    value = section->number(key, bounds).value_or(value);
+  };
+  read("tissue", share, patchiness.tissue);
+  read("tissue_length_mm", length, patchiness.tissue_length_mm);
+  read("skin", share, patchiness.skin);
+  read("skin_length_mm", length, patchiness.skin_length_mm);
+  read("muscle_mm", depth, patchiness.muscle_mm);
+  read("muscle_length_mm", length, patchiness.muscle_length_mm);
+  section->allow_no_more();
+  return patchiness;
+}
+
 }  // namespace
 
 simulation::Model read_model(const std::filesystem::path& path) {
   const toml::table table = parse_toml(path);
   const TomlReader file(table, path, "");
-  file.allow({"breast", "skin", "interface", "cut", "effect"});
+  file.allow({"breast", "skin", "interface", "cut", "effect", "patchiness"});
   Model model;
   read_base(file, model);
   read_effects(file, model);
+  patchiness_of(file);  // complains of what is wrong there
   return model;
+}
+
+diagnosis::Patchiness read_patchiness(const std::filesystem::path& path) {
+  const toml::table table = parse_toml(path);
+  return patchiness_of(TomlReader(table, path, ""));
 }
 
 }  // namespace supine::pipeline

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "diagnosis/evidence/patchiness.h"
 #include "simulation/model.h"
 
 namespace supine::pipeline {
@@ -13,5 +14,10 @@ namespace supine::pipeline {
 ///   unknown key, unknown effect or option, a value out of its range, poisson_ratio >= 0.5, poisson_ratio of an
 ///   incompressible neo_hookean skin, lower >= upper, value outside [lower, upper]
 simulation::Model read_model(const std::filesystem::path& file);
+
+/// [patchiness] of the same file: how uneven the body is taken to be. Read and checked by read_model() as well.
+/// @throws InputError  as read_model(): standard deviations of logarithms 0 to 2, lengths 5 to 200 mm, muscle 0 to 10
+/// mm
+diagnosis::Patchiness read_patchiness(const std::filesystem::path& file);
 
 }  // namespace supine::pipeline

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "common/error.h"
@@ -67,6 +69,11 @@ class DiagnoseTool : public Tool {
                    "how far breath may move the muscle between two scans, 1 sigma, mm (default: breath_mm of the "
                    "case, else 1)")
         ->check(CLI::NonNegativeNumber);
+    app.add_option("--prior", prior_of_sets_,
+                   "probabilities, before anything is measured, that nothing, one, two and three effects are missing: "
+                   "four numbers > 0 that add up to 1 (default: 0.5,0.3,0.15,0.05)")
+        ->delimiter(',')
+        ->expected(4);
     app.add_flag("--ladder", ladder_,
                  "add what is missing, fit and examine again, until nothing is missing or three effects were added; "
                  "writes ladder.json and model.toml, the model as given with what was added and the fitted numbers");
@@ -76,6 +83,7 @@ class DiagnoseTool : public Tool {
 
   Outcome run(Run& run) override {
     run.stage("read");
+    check_prior();
     check_model_target(run);
     announce_png(run, png_, folder() / "diagnosis.vtp");
     const auto measured = read_case_to_diagnose(run);
@@ -85,6 +93,9 @@ class DiagnoseTool : public Tool {
     LiveProgress live(run, std::chrono::seconds(0));
     options_.other_meshes = !no_other_meshes_;
     options_.priors = case_priors(measured->description, known_);
+    options_.priors.patchiness = read_patchiness(own_model(measured->model) ? case_folder_ / "model.toml" : model());
+    if (!prior_of_sets_.empty())
+      std::copy(prior_of_sets_.begin(), prior_of_sets_.end(), options_.priors.of_sets.begin());
     options_.progress = [&live](const std::string& what) { live.show(what); };
     const simulation::Model given = given_model(run, *measured);
     auto found = diagnosis::examine(subject_of(*measured, given, noise), options_);
@@ -180,6 +191,17 @@ class DiagnoseTool : public Tool {
       write(rung, folder() / std::to_string(rung) / "model.toml");
   }
 
+  void check_prior() const {
+    constexpr double rounding = 1e-6;
+    if (prior_of_sets_.empty()) return;
+    const double sum = std::accumulate(prior_of_sets_.begin(), prior_of_sets_.end(), 0.0);
+    const bool positive = std::all_of(prior_of_sets_.begin(), prior_of_sets_.end(), [](double p) { return p > 0; });
+    if (!positive || std::abs(sum - 1) > rounding)
+      throw InputError(fmt::format(
+          "--prior {}: must be four numbers > 0 that add up to 1 (these: {}), of nothing, one, two and three effects",
+          fmt::join(prior_of_sets_, ","), sum));
+  }
+
   /// A ladder takes a minute: that its model cannot be written is better known before.
   void check_model_target(const Run& run) const {
     const fs::path target = folder() / "model.toml";
@@ -192,6 +214,7 @@ class DiagnoseTool : public Tool {
 
   fs::path case_folder_, mesh_file_, model_file_, png_;
   KnownOptions known_;
+  std::vector<double> prior_of_sets_;
   diagnosis::ExamineOptions options_;
   bool no_other_meshes_ = false, ladder_ = false;
 };

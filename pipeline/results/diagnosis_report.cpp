@@ -201,6 +201,11 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["missing"] = found.diagnosis.missing;
   f["why"] = found.diagnosis.why;
   f["ambiguous_rest"] = found.diagnosis.ambiguous_rest;
+  f["under_other_priors"] = Json::array();
+  for (const diagnosis::OtherPrior& other : found.under_other_priors)
+    f["under_other_priors"].push_back({{"what", other.what},
+                                       {"verdict", diagnosis::verdict_name(other.diagnosis.verdict)},
+                                       {"missing", other.diagnosis.missing}});
   f["hypotheses"] = hypotheses_json(found);
   f["included"] = included_json(found);
   f["unexplained_mm"] = found.unexplained.mean_mm;
@@ -228,8 +233,12 @@ Json diagnosis_figures(const DiagnosisResult& result) {
                               {"mean_signed_mm", spot.mean_signed_mm},
                               {"centre_mm", {spot.centre_mm.x(), spot.centre_mm.y(), spot.centre_mm.z()}}});
   f["cannot_see"] = Json::array();
+  const std::vector<std::string> blind = diagnosis::not_seen(found);
   for (const Score& score : found.table.scores)
-    if (score.power < 0.5) f["cannot_see"].push_back({{"effect", score.effect}, {"power", score.power}});
+    if (std::find(blind.begin(), blind.end(), score.effect) != blind.end())
+      f["cannot_see"].push_back({{"effect", score.effect},
+                                 {"power", score.power},
+                                 {"expected_bayes_factor", std::exp(score.expected_ln_factor)}});
   for (const std::string& effect : found.unseen) f["cannot_see"].push_back({{"effect", effect}, {"power", 0.05}});
   f["next_measurement"] = Json::array();
   for (const auto& next : result.next)

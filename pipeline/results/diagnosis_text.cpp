@@ -92,6 +92,17 @@ void say_verdict(const Run& run, const Findings& found) {
   }
 }
 
+/// What the verdict would be where another prior changes it.
+void say_other_priors(const Run& run, const Findings& found) {
+  for (const diagnosis::OtherPrior& other : found.under_other_priors) {
+    const diagnosis::Diagnosis& d = other.diagnosis;
+    if (d.verdict == found.diagnosis.verdict && d.missing == found.diagnosis.missing) continue;
+    run.say(fmt::format(
+        "  with {} in the prior: {}{}", other.what, diagnosis::verdict_name(d.verdict),
+        d.missing.empty() ? "" : " " + joined(d.missing, d.verdict == Verdict::missing ? " and " : " or ")));
+  }
+}
+
 void say_limits(const Run& run, const DiagnosisResult& result) {
   const Findings& found = *result.found;
   std::vector<std::string> blind = diagnosis::not_seen(found);
@@ -127,6 +138,7 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result) {
                   b.registration, b.numerical, b.parameters, b.patchiness, b.model_form));
   run.say("  where:    " + where(result.hot_spots));
   say_verdict(run, found);
+  say_other_priors(run, found);
   say_limits(run, result);
 }
 

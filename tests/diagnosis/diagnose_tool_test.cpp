@@ -54,6 +54,40 @@ TEST_F(DiagnoseTool, BeginsWithTheCasesOwnModelWhereTheCalibratedOneCarriesNoMor
   EXPECT_NE(finished.err.find("soft.toml has no equilibrium, the fit begins with"), std::string::npos) << finished.err;
 }
 
+TEST_F(DiagnoseTool, TakesTheBodyToBeAsUnevenAsTheModelFileSays) {
+  const auto patchiness = [this] {
+    const Finished finished = diagnose({"--no-other-meshes", "--force"});
+    EXPECT_EQ(finished.code, 0) << finished.err;
+    return Json::parse(std::ifstream(found_ / "diagnosis.json"))["budget_mm"]["patchiness"].get<double>();
+  };
+  const double usual = patchiness();
+  write_text(case_ / "model.toml",
+             read_text(case_ / "model.toml") + "\n[patchiness]\ntissue = 0.5\nskin = 0.3\nmuscle_mm = 1.4\n");
+  EXPECT_NEAR(patchiness(), 2 * usual, 0.1 * usual);
+}
+
+TEST_F(DiagnoseTool, RefusesPriorsThatAreNone) {
+  for (const char* wrong : {"0.5,0.3,0.15,0.5", "0.7,0.3,0,0"}) {
+    const Finished finished = diagnose({"--prior", wrong});
+    EXPECT_EQ(finished.code, 2) << wrong;
+    EXPECT_NE(finished.err.find("add up to 1"), std::string::npos) << finished.err;
+  }
+  EXPECT_FALSE(fs::exists(found_));
+}
+
+TEST_F(DiagnoseTool, HoldsWhatIsBelievedOfTheNumberOfEffects) {
+  const auto nothing = [this](const std::string& prior) {
+    const Finished finished = diagnose({"--no-other-meshes", "--force", "--prior", prior});
+    EXPECT_EQ(finished.code, 0) << finished.err;
+    const Json json = Json::parse(std::ifstream(found_ / "diagnosis.json"));
+    for (const auto& hypothesis : json["hypotheses"])
+      if (hypothesis["effects"].empty()) return hypothesis["probability"].get<double>();
+    return -1.0;
+  };
+  const double usual = nothing("0.5,0.3,0.15,0.05"), sure = nothing("0.97,0.01,0.01,0.01");
+  EXPECT_GT(sure, usual);
+}
+
 TEST_F(DiagnoseTool, WarnsWhereTheMeshIsTakenToBeExact) {
   const Finished finished = diagnose({"--no-other-meshes"});
   ASSERT_EQ(finished.code, 0) << finished.err;

@@ -3,12 +3,14 @@
 
 #include <vector>
 
+#include "common/error.h"
 #include "simulation/catalogue.h"
 #include "tests/pipeline/temporary_folder.h"
 
 namespace supine::pipeline {
 namespace {
 
+namespace fs = std::filesystem;
 using simulation::Model;
 
 const std::string good = R"([breast]
@@ -61,6 +63,21 @@ TEST_F(ModelFile, EveryBaseKeyArrives) {
   EXPECT_EQ(m.interface.tangential_kpa_per_mm.value, 0.02);
   EXPECT_EQ(m.cut.kind, simulation::CutKind::held);
   EXPECT_EQ(m.cut.stiffness_kpa_per_mm.value, 1.25);
+}
+
+TEST_F(ModelFile, SaysHowUnevenTheBodyIs) {
+  const fs::path file = folder_ / "model.toml";
+  read(good);
+  EXPECT_EQ(read_patchiness(file).tissue, diagnosis::Patchiness{}.tissue) << "as usual where it is not said";
+  read(good + "[patchiness]\ntissue = 0.4\nskin_length_mm = 30\nmuscle_mm = 0\n");
+  const diagnosis::Patchiness said = read_patchiness(file);
+  EXPECT_EQ(said.tissue, 0.4);
+  EXPECT_EQ(said.skin_length_mm, 30);
+  EXPECT_EQ(said.muscle_mm, 0);
+  EXPECT_EQ(said.skin, diagnosis::Patchiness{}.skin);
+  EXPECT_THROW(read(good + "[patchiness]\ntissues = 0.4\n"), InputError);
+  EXPECT_THROW(read(good + "[patchiness]\nskin = -0.1\n"), InputError);
+  EXPECT_THROW(read(good + "[patchiness]\ntissue_length_mm = 0.02\n"), InputError) << "metres";
 }
 
 TEST_F(ModelFile, ATableIsFreeAndANumberIsFixed) {

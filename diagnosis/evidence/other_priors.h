@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "diagnosis/diagnose.h"
+#include "diagnosis/evidence/base_fit.h"
+#include "diagnosis/evidence/hypotheses.h"
+
+namespace supine::diagnosis {
+
+/// What would be said if something else had been believed before.
+struct OtherPrior {
+  std::string
+      what;  ///< "strengths half as wide", "… twice as wide", "the unexplained half as large", "… twice as large"
+  Diagnosis diagnosis;
+};
+
+/// The verdict with the prior widths of all strengths, and with the scale of what is unexplained, halved and doubled.
+/// Hypotheses are weighed again where they were linearised; those under a thousandth of the probability keep the
+/// evidence they have. What was left out and what is unexplained count as they are.
+std::vector<OtherPrior> under_other_priors(const BaseFit& base, const std::vector<Hypothesis>& hypotheses,
+                                           const std::vector<std::string>& effects,
+                                           const std::vector<Inclusion>& included, const Unexplained& unexplained,
+                                           const Priors& priors);
+
+}  // namespace supine::diagnosis

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/evidence/other_priors.h"
+
+#include <gtest/gtest.h>
+
+namespace supine::diagnosis {
+namespace {
+
+/// Twenty distances, one effect that changes all of them alike, and "nothing".
+struct Sheet {
+  static constexpr Eigen::Index points = 20;
+  BaseFit base;
+  std::vector<std::string> effects = {"ligament"};
+  std::vector<Hypothesis> hypotheses;
+  std::vector<Inclusion> included;
+  Priors priors;
+
+  explicit Sheet(double seen_mm) {
+    base.errors = 0.25 * Eigen::MatrixXd::Identity(points, points);
+    base.kernel = Eigen::MatrixXd::Identity(points, points);
+    base.scale_mm = 0.05, base.most_mm = 10;
+    base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);
+    Directions all;
+    all.add("ligament.stiffness_kpa_per_mm", Eigen::VectorXd::Ones(points), 0, 2);
+    const auto evidence =
+        std::make_shared<LinearEvidence>(*base.covariance, Eigen::VectorXd::Constant(points, seen_mm), all);
+    for (const bool with : {false, true}) {
+      Hypothesis h;
+      if (with) h.effects = {0}, h.rows = {0};
+      h.evidence = evidence;
+      h.weighed = evidence->weigh(h.rows);
+      h.ln_evidence = h.weighed.ln_evidence;
+      h.ln_prior = std::log(0.5);
+      hypotheses.push_back(h);
+    }
+    normalise(hypotheses);
+    included = inclusions(hypotheses, effects, priors);
+  }
+
+  std::vector<OtherPrior> others() const { return under_other_priors(base, hypotheses, effects, included, {}, priors); }
+};
+
+/// The least misfit that names the effect.
+Sheet just_named() {
+  double seen_mm = 0.2;
+  while (Sheet(seen_mm).included.front().probability < 0.955) seen_mm += 0.002;
+  return Sheet(seen_mm);
+}
+
+TEST(OtherPriors, AWiderPriorChargesAnEffectForWhatItCouldHaveBeen) {
+  const Sheet sheet = just_named();
+  const auto others = sheet.others();
+  ASSERT_EQ(others.size(), 4u);
+  EXPECT_EQ(others[0].what, "strengths half as wide");
+  EXPECT_EQ(others[0].diagnosis.verdict, Verdict::missing);
+  EXPECT_EQ(others[1].what, "strengths twice as wide");
+  EXPECT_EQ(others[1].diagnosis.verdict, Verdict::ambiguous) << "half the odds are under the level";
+}
+
+TEST(OtherPriors, DoNotChangeWhatIsPlain) {
+  for (const double seen_mm : {0.0, 1.5})
+    for (const OtherPrior& other : Sheet(seen_mm).others())
+      EXPECT_EQ(other.diagnosis.verdict, seen_mm > 0 ? Verdict::missing : Verdict::nothing_missing) << other.what;
+}
+
+TEST(OtherPriors, WhatWasLeftOutSpeaksAsBefore) {
+  Sheet sheet(1.5);
+  sheet.included.front().left_out_gain = -10;
+  for (const OtherPrior& other : sheet.others()) EXPECT_EQ(other.diagnosis.verdict, Verdict::ambiguous) << other.what;
+}
+
+}  // namespace
+}  // namespace supine::diagnosis
