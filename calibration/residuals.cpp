@@ -56,6 +56,11 @@ void add_landmarks(const MeasuredScene& scene, const Prediction& prediction, Res
 
 }  // namespace
 
+Residuals Residuals::skin() const {
+  const Eigen::Index rows = skin_rows();
+  return {skin_mm(), sigma_mm.head(rows), place.topRows(rows), q.topRows(rows), pose.head(rows), point.head(rows)};
+}
+
 Residuals residuals_of(const MeasuredScene& scene, const Prediction& prediction, const PointMask& mask,
                        const std::vector<double>& noise_mm) {
   Eigen::Index points = 0, landmarks = 0;

@@ -30,6 +30,8 @@ struct Residuals {
   bool is_landmark(Eigen::Index row) const { return row >= skin_rows(); }
   /// Distances to the skin alone.
   auto skin_mm() const { return distance_mm.head(skin_rows()); }
+  /// Without the landmarks.
+  Residuals skin() const;
   /// What rows with the same one have alike: 0 distances to the skin, 1 to 3 the axes of landmarks.
   int kind(Eigen::Index row) const { return is_landmark(row) ? 1 + point[row] % 3 : 0; }
 };

@@ -13,7 +13,6 @@
 #include <vtkIntArray.h>
 #include <vtkNew.h>
 #include <vtkOBJReader.h>
-#include <vtkPLYReader.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkSTLReader.h>
@@ -25,10 +24,13 @@
 #include <vtkXMLReader.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include "common/error.h"
+#include "reconstruction/ply_file.h"
 #include "reconstruction/surface_text.h"
 
 namespace supine::reconstruction {
@@ -77,6 +79,21 @@ vtkSmartPointer<vtkPolyData> run_reader(const std::filesystem::path& file) {
   reader->Update();
   vtkSmartPointer<vtkPolyData> data = reader->GetOutput();
   if (errors.any()) throw InputError(fmt::format("{}: cannot be read: {}", file.string(), errors.text()));
+  return data;
+}
+
+vtkSmartPointer<vtkPolyData> polygons_of(const PlySurface& ply) {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const auto& point : ply.points.rowwise()) points->InsertNextPoint(point.x(), point.y(), point.z());
+  vtkNew<vtkCellArray> faces;
+  for (const std::vector<int>& face : ply.faces) {
+    faces->InsertNextCell(static_cast<int>(face.size()));
+    for (const int vertex : face) faces->InsertCellPoint(vertex);
+  }
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->SetPoints(points);
+  data->SetPolys(faces);
   return data;
 }
 
@@ -144,6 +161,18 @@ void copy_triangles(vtkPolyData* data, Surface& surface) {
   }
 }
 
+/// A triangle that stands twice, either way round, is the same surface once: it would count twice in every mean.
+void drop_doubled_triangles(Surface& surface) {
+  std::set<std::array<int, 3>> known;
+  Eigen::Index kept = 0;
+  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
+    std::array<int, 3> corners = {surface.triangles(t, 0), surface.triangles(t, 1), surface.triangles(t, 2)};
+    std::sort(corners.begin(), corners.end());
+    if (known.insert(corners).second) surface.triangles.row(kept++) = surface.triangles.row(t).eval();
+  }
+  surface.triangles.conservativeResize(kept, 3);
+}
+
 void copy_region(vtkPolyData* data, const std::filesystem::path& file, Surface& surface) {
   vtkDataArray* region = data->GetCellData()->GetArray("region");
   if (region == nullptr || region->GetNumberOfTuples() != surface.triangles.rows()) return;
@@ -188,8 +217,9 @@ SurfaceFile read_surface_file(const std::filesystem::path& file) {
   vtkSmartPointer<vtkPolyData> data;
   Declaration declaration;
   if (kind == ".ply") {
-    declaration = inspect_ply(file);
-    data = run_reader<vtkPLYReader>(file);
+    PlySurface ply = read_ply(file);
+    declaration = ply.declaration;
+    data = polygons_of(ply);
   } else if (kind == ".stl") {
     declaration = inspect_stl(file);
     data = run_reader<vtkSTLReader>(file);
@@ -211,6 +241,7 @@ SurfaceFile read_surface_file(const std::filesystem::path& file) {
   copy_points(data, file, result.surface);
   copy_triangles(data, result.surface);
   copy_region(data, file, result.surface);
+  if (kind != ".vtp") drop_doubled_triangles(result.surface);
   drop_unused_points(result.surface);
   return result;
 }

@@ -7,8 +7,6 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
-#include <map>
-#include <sstream>
 #include <vector>
 
 #include "common/error.h"
@@ -45,81 +43,6 @@ std::ifstream open(const std::filesystem::path& file) {
   return in;
 }
 
-struct PlyElement {
-  std::string name;
-  long long count = 0;
-  long long least_bytes = 0;  // of one entry in a binary file; a face has three indices or more
-};
-
-long long ply_type_bytes(const std::string& type) {
-  static const std::map<std::string, long long> bytes = {{"char", 1},  {"uchar", 1},   {"int8", 1},   {"uint8", 1},
-                                                         {"short", 2}, {"ushort", 2},  {"int16", 2},  {"uint16", 2},
-                                                         {"int", 4},   {"uint", 4},    {"int32", 4},  {"uint32", 4},
-                                                         {"float", 4}, {"float32", 4}, {"double", 8}, {"float64", 8}};
-  const auto found = bytes.find(type);
-  return found == bytes.end() ? 0 : found->second;
-}
-
-struct PlyHeader {
-  bool ascii = false;
-  std::vector<PlyElement> elements;
-  Declaration declaration;
-};
-
-void read_ply_line(const std::vector<std::string>& w, const std::filesystem::path& file, PlyHeader& header) {
-  if (w[0] == "format" && w.size() > 1) {
-    header.ascii = w[1] == "ascii";
-  } else if (w[0] == "element" && w.size() == 3) {
-    header.elements.push_back({w[1], number(w[2], file, "the count of element " + w[1]), 0});
-  } else if (w[0] == "property" && w.size() >= 3 && !header.elements.empty()) {
-    PlyElement& element = header.elements.back();
-    if (w[1] == "list" && w.size() == 5)
-      element.least_bytes += ply_type_bytes(w[2]) + (element.name == "face" ? 3 * ply_type_bytes(w[3]) : 0);
-    else
-      element.least_bytes += ply_type_bytes(w[1]);
-  }
-}
-
-PlyHeader read_ply_header(std::ifstream& in, const std::filesystem::path& file) {
-  std::string line;
-  std::getline(in, line);
-  if (line.substr(0, 3) != "ply")
-    throw InputError(fmt::format("{}: not a PLY file (it does not begin with ply)", file.string()));
-  PlyHeader header;
-  while (std::getline(in, line)) {
-    const std::vector<std::string> w = words(line);
-    if (w.empty()) continue;
-    if (w[0] == "end_header") return header;
-    if (w[0] == "comment" || w[0] == "obj_info")
-      read_declaration(line, file, header.declaration);
-    else
-      read_ply_line(w, file, header);
-  }
-  throw InputError(fmt::format("{}: cut short: the PLY header has no end_header line", file.string()));
-}
-
-void check_ply_body(std::ifstream& in, const std::filesystem::path& file, const PlyHeader& header) {
-  long long lines = 0, bytes = 0;
-  for (const PlyElement& element : header.elements) {
-    lines += element.count;
-    bytes += element.count * element.least_bytes;
-  }
-  const std::streamoff begin = in.tellg();
-  if (!header.ascii) {
-    const long long there = static_cast<long long>(std::filesystem::file_size(file)) - begin;
-    if (there < bytes)
-      throw InputError(
-          fmt::format("{}: cut short: {} bytes follow the header, its counts need at least {}; copy the file again",
-                      file.string(), there, bytes));
-    return;
-  }
-  long long found = 0;
-  for (std::string line; std::getline(in, line);) found += line.find_first_not_of(" \t\r") != std::string::npos;
-  if (found < lines)
-    throw InputError(fmt::format("{}: cut short: {} lines follow the header, its counts need {}; copy the file again",
-                                 file.string(), found, lines));
-}
-
 // Resolves one index of an OBJ face ("7", "7/1/3", "-2") and checks that the vertex is there.
 void check_obj_index(const std::string& token, long long vertices, const std::filesystem::path& file, long long line) {
   const long long index = number(token.substr(0, token.find('/')), file, fmt::format("a face index in line {}", line));
@@ -127,10 +50,6 @@ void check_obj_index(const std::string& token, long long vertices, const std::fi
     throw InputError(
         fmt::format("{}: line {}: face names vertex {}, the file has {}", file.string(), line, index, vertices));
 }
-
-}  // namespace
-
-namespace {
 
 void declare_frame(const std::string& frame, const std::filesystem::path& file, Declaration& declaration) {
   if (frame != "LPS" && frame != "RAS")
@@ -156,17 +75,6 @@ void read_declaration(std::string_view comment, const std::filesystem::path& fil
       declaration.unit = w[i + 1];
     }
   }
-}
-
-Declaration inspect_ply(const std::filesystem::path& file) {
-  std::ifstream in = open(file);
-  const PlyHeader header = read_ply_header(in, file);
-  long long vertices = 0;
-  for (const PlyElement& element : header.elements)
-    if (element.name == "vertex") vertices = element.count;
-  if (vertices <= 0) throw InputError(fmt::format("{}: has no vertices", file.string()));
-  check_ply_body(in, file, header);
-  return header.declaration;
 }
 
 Declaration inspect_stl(const std::filesystem::path& file) {

@@ -19,9 +19,9 @@ struct Declaration {
 void read_declaration(std::string_view comment, const std::filesystem::path& file, Declaration& declaration);
 
 /// Checks the text part of a file before the reader proper sees it, which does not notice such damage.
-/// @throws InputError  wrong magic, no vertices, fewer bytes or lines than the header promises (PLY, STL),
-///   a face that names a vertex there is not (OBJ; names the line)
-Declaration inspect_ply(const std::filesystem::path& file);
+/// @throws InputError  wrong magic, no vertices, fewer bytes or lines than the header promises (STL), a face that names
+/// a
+///   vertex there is not (OBJ; names the line)
 Declaration inspect_stl(const std::filesystem::path& file);
 Declaration inspect_obj(const std::filesystem::path& file);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "calibration/noise.h"
 #include "common/error.h"
@@ -121,6 +122,17 @@ double objective(const BaseFit& base, const VectorXd& y, const Trial& at) {
   return sum;
 }
 
+LinearEvidence evidence_at(const BaseFit& base) {
+  return {*base.covariance, base.distances(base.fit.residuals),
+          directions_at(base.fit, *base.parameters, base.nuisances, base.clusters)};
+}
+
+Weighed with_all(const LinearEvidence& evidence) {
+  std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
+  std::iota(all.begin(), all.end(), 0);
+  return evidence.weigh(all);
+}
+
 class Fitter {
  public:
   Fitter(Evaluator& evaluator, BaseFit& base) : evaluator_(evaluator), base_(base) {
@@ -154,11 +166,8 @@ class Fitter {
 
   /// One step of Gauss and Newton, shortened until F falls. @return  whether it did by more than a little
   bool improve() {
-    const LinearEvidence evidence(*base_.covariance, base_.distances(base_.fit.residuals),
-                                  directions_at(base_.fit, *base_.parameters, base_.nuisances, base_.clusters));
-    std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
-    for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<int>(k);
-    const Weighed weighed = evidence.weigh(all);
+    const LinearEvidence evidence = evidence_at(base_);
+    const Weighed weighed = with_all(evidence);
     Index likeliest;
     weighed.size_probability.maxCoeff(&likeliest);
     base_.size_mm = base_.size_of(weighed);
@@ -227,6 +236,27 @@ Directions directions_at(const calibration::Fit& fit, const FreeParameters& para
     all.add(nuisance.name(), clusters.means(nuisance.shape_mm), -nuisance.value, 1, nuisance.value * nuisance.sigma,
             nuisance.sigma);
   return all;
+}
+
+JointPosterior posterior_of(const BaseFit& base) {
+  const LinearEvidence evidence = evidence_at(base);
+  const Weighed weighed = with_all(evidence);
+  const Directions& all = evidence.directions();
+  const Index moduli = base.fit.u.size();
+  JointPosterior result{all.names, VectorXd(all.size()), VectorXd(all.size()), MatrixXd::Zero(moduli, moduli)};
+  VectorXd mean = VectorXd::Zero(moduli);
+  for (Index k = 0; k < all.size(); ++k) {
+    const auto [offset, sd] = weighed.number(k);
+    result.value[k] = all.stands[k] + all.unit[k] * offset;
+    result.sd[k] = all.unit[k] * sd;
+    if (k < moduli) mean[k] = offset;
+  }
+  for (std::size_t b = 0; b < weighed.mean.size(); ++b) {
+    const VectorXd from = weighed.mean[b].head(moduli) - mean;
+    result.of_parameters += weighed.size_probability[static_cast<Index>(b)] *
+                            (weighed.covariance[b].topLeftCorner(moduli, moduli) + from * from.transpose());
+  }
+  return result;
 }
 
 VectorXd BaseFit::distances(const Residuals& residuals) const {

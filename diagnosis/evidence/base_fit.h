@@ -42,6 +42,14 @@ struct BaseFit {
   double size_of(const Weighed& weighed) const;
 };
 
+/// The numbers of a base fit and of its nuisances, with what is left open of them.
+struct JointPosterior {
+  std::vector<std::string> names;  ///< free parameters, then nuisances
+  Eigen::VectorXd value, sd;       ///< in their units; of a number of the base model that is never known its logarithm
+  Eigen::MatrixXd of_parameters;   ///< covariance of the coordinates of the free parameters, over all else
+};
+JointPosterior posterior_of(const BaseFit& base);
+
 /// What distances depend on at a fit, as offsets from where they stand: its free parameters with their priors, then
 /// nuisances; over the clusters.
 Directions directions_at(const calibration::Fit& fit, const calibration::FreeParameters& parameters,

@@ -120,23 +120,25 @@ void read_pose_landmarks(Run& run, MeasuredCase& in, const std::vector<Pose>& po
                            paired(prone, read_landmarks(run.input(*pose.landmarks), c.frame), *pose.landmarks));
 }
 
-calibration::MeasuredScene scene_of(const MeasuredCase& in, bool whole) {
+calibration::MeasuredScene scene_of(const MeasuredCase& in, bool whole, bool marked) {
   calibration::MeasuredScene scene{&in.mesh, &in.anatomy, {"prone", in.description.pose("prone").gravity}, {}};
   for (const Measurement& m : in.fitted) scene.measurements.push_back(&m);
   for (const Measurement& m : in.held_out)
     if (whole) scene.measurements.push_back(&m);
   for (const Measurement* m : scene.measurements) {
     const auto found = in.landmarks.find(m->pose.name);
-    scene.landmarks.push_back(!whole || found == in.landmarks.end() ? nullptr : &found->second);
+    scene.landmarks.push_back(!marked || found == in.landmarks.end() ? nullptr : &found->second);
   }
   return scene;
 }
 
 }  // namespace
 
-calibration::MeasuredScene MeasuredCase::fitted_scene() const { return scene_of(*this, false); }
+calibration::MeasuredScene MeasuredCase::fitted_scene() const { return scene_of(*this, false, false); }
 
-calibration::MeasuredScene MeasuredCase::whole_scene() const { return scene_of(*this, true); }
+calibration::MeasuredScene MeasuredCase::marked_scene() const { return scene_of(*this, false, true); }
+
+calibration::MeasuredScene MeasuredCase::whole_scene() const { return scene_of(*this, true, true); }
 
 std::vector<double> MeasuredCase::noise_mm(calibration::Evaluator& evaluator) const {
   const auto& measurements = evaluator.scene().measurements;

@@ -33,6 +33,8 @@ struct MeasuredCase {
 
   /// Only the surfaces that are fitted, or all that is measured, landmarks included.
   calibration::MeasuredScene fitted_scene() const;
+  /// What is fitted and its landmarks.
+  calibration::MeasuredScene marked_scene() const;
   calibration::MeasuredScene whole_scene() const;
   /// Of each measurement of a scene: as the case says, or estimated from the distances to the given model.
   /// @param evaluator  of fitted_scene() or whole_scene()

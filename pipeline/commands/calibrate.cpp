@@ -8,6 +8,9 @@
 #include "calibration/error_map.h"
 #include "calibration/held_out.h"
 #include "common/error.h"
+#include "diagnosis/evidence/base_fit.h"
+#include "diagnosis/weighted_fit.h"
+#include "pipeline/case/case_priors.h"
 #include "pipeline/case/journal_key.h"
 #include "pipeline/case/measured_case.h"
 #include "pipeline/case/model_edit.h"
@@ -23,6 +26,13 @@ namespace fs = std::filesystem;
 using calibration::Evaluator;
 using calibration::Fit;
 using calibration::FreeParameters;
+
+/// The fit as the statistics of surfaces take it: without landmarks.
+Fit skin_of(Fit fit) {
+  fit.linearisation.slope.conservativeResize(fit.residuals.skin_rows(), Eigen::NoChange);
+  fit.residuals = fit.residuals.skin();
+  return fit;
+}
 
 /// The scan's place as six more unknowns, with the catalogue's priors.
 void add_scan_offset(simulation::Model& model) {
@@ -57,9 +67,10 @@ class CalibrateTool : public Tool {
     app.add_option("--model", model_file_, "the model to start from (default: CASE/model.toml)");
     app.add_option(
            "--method", method_,
-           "least-squares (signed distances scan to model, exact sensitivities) or cmaes (the study's: MAE model to "
-           "scan, without gradient; value and prior_sd are its start and sigma)")
-        ->check(CLI::IsMember({"least-squares", "cmaes"}))
+           "least-squares (signed distances scan to model, exact sensitivities), joint (with all that is never known: "
+           "place of the scans, gravity, breath, uneven tissue, the mesh's error; landmarks count; a minute) or cmaes "
+           "(the study's: MAE model to scan, without gradient; value and prior_sd are its start and sigma)")
+        ->check(CLI::IsMember({"least-squares", "joint", "cmaes"}))
         ->capture_default_str();
     app.add_option("--until-mae", until_mae_,
                    "MAE model to scan (study) to reach, mm: cmaes stops there; not reached: exit code 1");
@@ -92,6 +103,7 @@ class CalibrateTool : public Tool {
 
   Outcome run(Run& run) override {
     run.stage("read");
+    check_method();
     claim_targets(run);
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
     simulation::Model model = measured_->model;
@@ -112,6 +124,18 @@ class CalibrateTool : public Tool {
 
  private:
   fs::path folder() const { return output.empty() ? mesh_file_.parent_path() : output; }
+
+  void check_method() const {
+    if (method_ != "joint") return;
+    for (const auto& [given, option] : {std::pair(no_priors_, "--no-priors"), std::pair(scan_offset_, "--scan-offset"),
+                                        std::pair(intervals_ == "profile", "--intervals profile"),
+                                        std::pair(starts_ > 1, "--starts"), std::pair(map_ > 0, "--map")})
+      if (given)
+        throw InputError(
+            fmt::format("{} goes with another method than joint, which has priors, the scans' places and "
+                        "the intervals of its posterior in it; leave {} out, or take --method least-squares",
+                        option, option));
+  }
 
   /// Before the work, so that nobody waits for an answer that cannot be written.
   void claim_targets(Run& run) const {
@@ -153,11 +177,16 @@ class CalibrateTool : public Tool {
     result.method = method_;
     result.noise_mm = options.noise_mm;
     run.stage("fit");
-    result.fit = method_ == "cmaes" ? search_cmaes(run, evaluator, parameters, options, live)
-                                    : calibration::fit_least_squares(evaluator, parameters, options);
+    Eigen::MatrixXd posterior;
+    if (method_ == "joint")
+      posterior = fit_jointly(parameters, options, live, result);
+    else
+      result.fit = method_ == "cmaes" ? search_cmaes(run, evaluator, parameters, options, live)
+                                      : calibration::fit_least_squares(evaluator, parameters, options);
     run.stage("worth");
-    result.uncertainty = calibration::judge(result.fit, parameters, options.use_priors);
-    result.interval_kind = intervals_;
+    result.uncertainty = calibration::judge(skin_of(result.fit), parameters, options.use_priors);
+    if (method_ == "joint") result.uncertainty.covariance = posterior;
+    result.interval_kind = method_ == "joint" ? "posterior" : intervals_;
     if (method_ == "cmaes") result.interval_kind = "linear";  // another optimum than that of the profiled cost
     if (result.interval_kind == "profile") {
       int runs = 0;
@@ -169,6 +198,26 @@ class CalibrateTool : public Tool {
     }
     hold_out(parameters, options, result);
     return result;
+  }
+
+  /// Moduli together with all that is never known. @return  covariance of the coordinates, over all else
+  Eigen::MatrixXd fit_jointly(const FreeParameters& parameters, const calibration::FitOptions& options,
+                              LiveProgress& live, CalibrationResult& result) const {
+    diagnosis::BaseFitOptions joint;
+    joint.priors = case_priors(measured_->description, {});
+    joint.priors.patchiness = read_patchiness(measured_->model_file);
+    joint.progress = [&live](const std::string& what) { live.show(what); };
+    Evaluator evaluator(measured_->marked_scene(), parameters.base(), diagnosis::accurate_enough());
+    diagnosis::BaseFit base = diagnosis::fit_base_model(evaluator, parameters.base(), parameters.base(),
+                                                        options.noise_mm, &measured_->start, joint);
+    const diagnosis::JointPosterior posterior = diagnosis::posterior_of(base);
+    for (Eigen::Index k = parameters.size(); k < posterior.value.size(); ++k)
+      result.nuisances.push_back({posterior.names[static_cast<std::size_t>(k)], posterior.value[k], posterior.sd[k]});
+    result.fit = std::move(base.fit);
+    result.fit.evaluations = base.evaluations;
+    result.fit.converged = true;
+    result.fit.message = "joint fit with all that is never known";
+    return posterior.of_parameters;
   }
 
   Fit search_cmaes(Run& run, Evaluator& evaluator, const FreeParameters& parameters,
@@ -214,13 +263,14 @@ class CalibrateTool : public Tool {
 
   void hold_out(const FreeParameters& parameters, const calibration::FitOptions& options,
                 CalibrationResult& result) const {
-    const auto& residuals = result.fit.residuals;
+    const Fit fit = skin_of(result.fit);
+    const auto& residuals = fit.residuals;
     const auto as_list = [](const Eigen::VectorXd& d) { return std::vector<double>(d.begin(), d.end()); };
     result.in_sample = calibration::figures_of(as_list(residuals.distance_mm));
     Eigen::VectorXd priors = parameters.prior_information();
     if (!options.use_priors) priors.setZero();
     result.held_out_blocks = calibration::figures_of(as_list(calibration::held_out_distances(
-        residuals, result.fit.linearisation.slope, priors, calibration::spatial_blocks(residuals))));
+        residuals, fit.linearisation.slope, priors, calibration::spatial_blocks(residuals))));
     if (measured_->held_out.empty()) return;
     calibration::MeasuredScene scene = measured_->whole_scene();
     scene.measurements.erase(scene.measurements.begin(),

@@ -121,7 +121,8 @@ Json calibration_figures(const MeasuredCase& measured, const FreeParameters& par
   f["message"] = fit.message;
   f["start_costs"] = Json::array();
   for (const double cost : fit.start_costs) f["start_costs"].push_back(number(cost));
-  f["scan_points_used"] = fit.residuals.size();
+  f["scan_points_used"] = fit.residuals.skin_rows();
+  if (result.method == "joint") f["landmarks_used"] = fit.residuals.landmark_rows / 3;
   f["poses"] = Json::array();
   for (std::size_t m = 0; m < measured.fitted.size(); ++m)
     f["poses"].push_back({{"pose", measured.fitted[m].pose.name},
@@ -134,6 +135,8 @@ Json calibration_figures(const MeasuredCase& measured, const FreeParameters& par
                       {"length_mm", errors.length_mm},
                       {"effective_points", result.uncertainty.effective_points}};
   f["worth"] = worth_json(parameters, result);
+  if (!result.nuisances.empty()) f["nuisances"] = Json::array();
+  for (const auto& n : result.nuisances) f["nuisances"].push_back({{"name", n.name}, {"value", n.value}, {"sd", n.sd}});
   f["remarks"] = calibration_remarks(parameters, result);
   return f;
 }

@@ -12,11 +12,11 @@ namespace supine::pipeline {
 
 /// A calibrated model with what it is worth, whatever method found it.
 struct CalibrationResult {
-  std::string method;  ///< least-squares or cmaes
+  std::string method;  ///< least-squares, joint or cmaes
   calibration::Fit fit;
   calibration::Uncertainty uncertainty;
   std::vector<calibration::Interval> intervals;
-  std::string interval_kind;  ///< profile or linear
+  std::string interval_kind;  ///< profile, linear or posterior
   std::vector<double> noise_mm;
   calibration::DistanceFigures in_sample;        ///< points that were fitted
   calibration::DistanceFigures held_out_blocks;  ///< the same points, each predicted from a fit without its block
@@ -26,6 +26,12 @@ struct CalibrationResult {
     calibration::DistanceFigures figures;
   };
   std::vector<PoseError> held_out_poses;
+  /// Of the joint method: a number that is never known, where it came out and what is left open of it.
+  struct Nuisance {
+    std::string name;
+    double value, sd;
+  };
+  std::vector<Nuisance> nuisances;
 };
 
 /// Keys as in docs/calibration.md.

@@ -5,10 +5,14 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <fstream>
 
+#include "common/error.h"
 #include "reconstruction/surface_check.h"
 #include "tests/reconstruction/volumes.h"
 
@@ -46,6 +50,10 @@ std::string ply(const std::string& comment, const std::string& faces = tetrahedr
       "{}\n"
       "property list uchar int vertex_indices\nend_header\n0 0 0\n10 0 0\n0 20 0\n0 0 30\n{}",
       comment, face_count, faces);
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);
 }
 
 TEST_F(SurfaceFiles, OurOwnFormatGivesBackEveryBitOfPointsTrianglesAndRegions) {
@@ -146,7 +154,16 @@ TEST_F(SurfaceFiles, EachRefusalNamesTheFileAndTheFault) {
   expect(refusal("a.ply", "solid"), {"a.ply", "not a PLY"});
   expect(refusal("short.ply", ply("").substr(0, ply("").size() - 10)), {"short.ply", "cut short"});
   expect(refusal("head.ply", "ply\nformat ascii 1.0\n"), {"end_header"});
-  expect(refusal("index.ply", ply("", "3 0 1 9\n", 1)), {"index.ply", "9", "4"});
+  expect(refusal("index.ply", ply("", "3 0 1 9\n", 1)), {"index.ply", "line 14", "vertex 9", "4"});
+  expect(refusal("comma.ply", replaced(ply(""), "10 0 0", "10,5 0 0")), {"line 11", "\"10,5\"", "point"});
+  expect(refusal("more.ply", replaced(ply(""), "10 0 0", "10 5 0 0")), {"line 11", "4 numbers", "3"});
+  expect(refusal("blank.ply", replaced(ply(""), "10 0 0", "")), {"line 11", "cut short"});
+  expect(refusal("flaot.ply", replaced(ply(""), "float x", "flaot x")), {"line 4", "known type"});
+  expect(refusal("noy.ply", replaced(ply(""), "float y", "float w")), {"no property y"});
+  expect(refusal("edge.ply", ply("", "2 0 1\n", 1)), {"line 14", "corners", "2"});
+  expect(refusal("point.ply", ply("", "0\n", 1)), {"line 14", "corners", "0"});
+  expect(refusal("list.ply", replaced(ply(""), "vertex_indices", "corners")), {"vertex_indices"});
+  expect(refusal("format.ply", replaced(ply(""), "format ascii", "format text")), {"format", "binary_little_endian"});
   expect(refusal("both.ply", ply("comment frame LPS\ncomment frame RAS\n")), {"both.ply", "LPS", "RAS"});
   expect(refusal("frame.ply", ply("comment frame XYZ\n")), {"XYZ"});
   expect(refusal("unit.ply", ply("comment unit m\n")), {"\"m\"", "mm"});
@@ -155,6 +172,59 @@ TEST_F(SurfaceFiles, EachRefusalNamesTheFileAndTheFault) {
   expect(refusal("a.stl", "hello"), {"a.stl", "not an STL"});
   expect(refusal("a.vtp", "<VTKFile"), {"a.vtp", "cannot be read"});
   expect(message_of([this] { read_surface(write("ok.ply", ply("")), "XYZ"); }), {"XYZ", "LPS", "RAS"});
+}
+
+/// The tetrahedron as a binary file.
+std::string binary_ply(bool big_endian) {
+  std::string bytes = replaced(ply("", "", 4), "ascii", big_endian ? "binary_big_endian" : "binary_little_endian");
+  bytes.resize(bytes.find("end_header\n") + 11);
+  const auto add = [&](const auto& value) {
+    char raw[sizeof value];
+    std::memcpy(raw, &value, sizeof value);
+    if (big_endian) std::reverse(raw, raw + sizeof value);
+    bytes.append(raw, sizeof value);
+  };
+  for (const float number : {0, 0, 0, 10, 0, 0, 0, 20, 0, 0, 0, 30}) add(number);
+  for (const std::array<int, 3>& face : {std::array{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}) {
+    bytes += '\3';
+    for (const int corner : face) add(corner);
+  }
+  return bytes;
+}
+
+TEST_F(SurfaceFiles, BinaryPlyOfBothByteOrders) {
+  const Surface text = read_surface(write("text.ply", ply("")));
+  for (const bool big : {false, true}) {
+    const Surface read = read_surface(write("binary.ply", binary_ply(big)));
+    EXPECT_EQ(read.points, text.points) << big;
+    EXPECT_EQ(read.triangles, text.triangles) << big;
+  }
+}
+
+TEST_F(SurfaceFiles, DamagedPlyIsReadOrRefusedNeverWorse) {
+  for (const std::string& whole : {ply(""), binary_ply(false), binary_ply(true)}) {
+    int refused = 0;
+    const auto attempt = [&](const std::string& bytes) {
+      try {
+        read_surface(write("damaged.ply", bytes));
+      } catch (const InputError&) {
+        ++refused;
+      }
+    };
+    for (std::size_t size = 0; size < whole.size(); ++size) attempt(whole.substr(0, size));
+    EXPECT_GT(refused, static_cast<int>(whole.size()) - 3) << "only the last line's end may be missing";
+    for (std::size_t at = 0; at < whole.size(); ++at)
+      for (const int bit : {1, 64}) {
+        std::string flipped = whole;
+        flipped[at] = static_cast<char>(flipped[at] ^ bit);
+        attempt(flipped);
+      }
+  }
+}
+
+TEST_F(SurfaceFiles, ATriangleThatStandsTwiceIsOneSurface) {
+  const std::string doubled = std::string(tetrahedron_faces) + "3 2 1 0\n3 0 1 3\n";
+  EXPECT_EQ(read_surface(write("doubled.ply", ply("", doubled, 6))).triangles.rows(), 4);
 }
 
 TEST_F(SurfaceFiles, NotANumberIsRefusedWithItsPoint) {
