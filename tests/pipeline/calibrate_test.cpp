@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -130,6 +131,37 @@ TEST_F(Calibrate, CmaesMissesAnImpossibleTargetAndSaysSo) {
   EXPECT_EQ(json("cma/calibration.json")["method"], "cmaes");
   EXPECT_EQ(json("cma/calibration.json")["evaluations"], 6);
   EXPECT_FALSE(fs::exists(folder() / "cma/calibration.runs"));
+}
+
+TEST_F(Calibrate, JointlyFitsWhatIsNeverKnown) {
+  const Finished plain = run("calibrate", "plain"), joint = run("calibrate", "joint", {"--method", "joint"});
+  ASSERT_LE(plain.code, 1) << plain.err;
+  ASSERT_LE(joint.code, 1) << joint.err;
+  const Json result = json("joint/calibration.json"), before = json("plain/calibration.json");
+  EXPECT_EQ(result["method"], "joint");
+  EXPECT_EQ(result["interval_kind"], "posterior");
+  EXPECT_EQ(result["landmarks_used"], 0);
+  EXPECT_NE(result["parameters"][0]["value"], before["parameters"][0]["value"]) << "the mesh's error is taken away";
+  std::map<std::string, Json> nuisances;
+  for (const Json& one : result["nuisances"]) nuisances[one["name"]] = one;
+  ASSERT_TRUE(nuisances.contains("supine/misregistration.shift_x_mm")) << result["nuisances"];
+  EXPECT_GT(nuisances["supine/misregistration.shift_x_mm"]["sd"].get<double>(), 0);
+  EXPECT_LT(nuisances["supine/misregistration.shift_y_mm"]["sd"].get<double>(), 1.5) << "2 mm before the scan";
+  const simulation::Model model = read_model(folder() / "joint/model.toml");
+  EXPECT_NEAR(model.breast.young_modulus_kpa.value, result["parameters"][0]["value"].get<double>(), 1e-5);
+  EXPECT_TRUE(model.effects.empty()) << "where a scan lies is no property of the breast";
+}
+
+TEST_F(Calibrate, RefusesWhatTheJointMethodHasInIt) {
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"--no-priors"}, {"--scan-offset"}, {"--intervals", "profile"}, {"--starts", "3"}}) {
+    std::vector<std::string> words = {"--method", "joint"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Finished finished = run("calibrate", "refused", words);
+    EXPECT_EQ(finished.code, 2) << more[0];
+    EXPECT_NE(finished.err.find(more[0]), std::string::npos) << finished.err;
+    EXPECT_FALSE(fs::exists(folder() / "refused"));
+  }
 }
 
 TEST_F(Calibrate, RefusesWhatItCannotDo) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/rms.h"
 #include "diagnosis/evidence/base_fit.h"
@@ -109,6 +110,26 @@ std::pair<double, double> found_in(const calibration::MeasuredScene& scene, cons
   const auto [offset, sd] = evidence.weigh(rows).number(of);
   return {evidence.directions().stands[of] + evidence.directions().unit[of] * offset,
           evidence.directions().unit[of] * sd};
+}
+
+TEST(JointPosterior, HoldsTheTruthOfATwin) {
+  const Marked marked(0.5);
+  const simulation::Model start = supine::testing::twin_start();
+  simulation::Model truth = supine::testing::twin_truth();
+  calibration::Evaluator evaluator(marked.scene(), start, accurate_enough());
+  BaseFitOptions options;
+  options.other_meshes = false;
+  const BaseFit base = fit_base_model(evaluator, start, start, {0.3}, nullptr, options);
+  const JointPosterior posterior = posterior_of(base);
+  ASSERT_EQ(posterior.of_parameters.rows(), base.fit.u.size());
+  for (Eigen::Index k = 0; k < base.fit.u.size(); ++k) {
+    const auto row = static_cast<std::size_t>(k);
+    const double wanted = simulation::find_setting(truth, posterior.names[row])->value;
+    const double unit = base.parameters->slope(base.fit.u)[k];
+    EXPECT_NEAR(posterior.sd[k], unit * std::sqrt(posterior.of_parameters(k, k)), 1e-9 * posterior.sd[k]);
+    EXPECT_NEAR(posterior.value[k], wanted, 3 * posterior.sd[k]) << posterior.names[row];
+    EXPECT_LT(posterior.sd[k], wanted) << "something is known of it";
+  }
 }
 
 TEST(LandmarkRows, HelpToTellWhereAScanLies) {
