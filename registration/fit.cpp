@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "common/statistics.h"
@@ -16,7 +17,7 @@ namespace {
 using StateMatrix = Eigen::Matrix<double, unknowns, unknowns>;
 constexpr int fit_points = 320, settle_iterations = 12, average_iterations = 4;
 constexpr double softness_sd = 0.3, rigid_length_mm = 40;
-constexpr double misfits_mm[] = {0.3, 0.6, 1.2, 2.4, 4.8, 9.6}, lengths_mm[] = {15, 30, 60, 120};
+constexpr double misfits_mm[] = {0.8, 1.6, 3.2, 6.4, 12.8}, lengths_mm[] = {15, 30, 60, 120};
 
 double matern(double distance, double length) {
   const double scaled = std::sqrt(3.0) * distance / length;
@@ -136,6 +137,26 @@ Gate next_gate(const Observations& seen, double noise_mm) {
   return {std::max(4 * noise_mm, 4 * 1.4826 * median(seen.residual.cwiseAbs()))};
 }
 
+/// The skin where it lies with the present softness.
+class SoftSkin {
+ public:
+  explicit SoftSkin(const Problem& problem) : problem_(problem) {
+    if (!problem.target.skin || problem.target.skin_displacement.rows() == 0) return;
+    skin_.emplace(problem.target.skin->points(), problem.target.skin->triangles());
+    problem_.target.skin = &*skin_;
+    rest_ = problem.target.skin->points();
+  }
+  const Problem& at(double softness) {
+    if (skin_) skin_->move(rest_ + softness * problem_.target.skin_displacement);
+    return problem_;
+  }
+
+ private:
+  Problem problem_;
+  Points rest_;
+  std::optional<calibration::SurfaceDistance> skin_;
+};
+
 }  // namespace
 
 Fit fit(const Problem& problem, const RigidTransform& start, const Belief& belief) {
@@ -148,9 +169,11 @@ Fit fit(const Problem& problem, const RigidTransform& start, const Belief& belie
       Eigen::Vector3d::Constant(1 / (belief.turn_rad * belief.turn_rad)), 1 / (softness_sd * softness_sd);
   Gate gate{lost_mm};
   const RigidTransform back = start.inverse();
+  SoftSkin skin(problem);
   for (int i = 0; i < settle_iterations + average_iterations; ++i) {
     found.pivot = found.transform.at(centre.transpose());
-    const Observations seen = observe(problem, rows, found.transform, found.pivot, found.softness, gate);
+    const Observations seen =
+        observe(skin.at(found.softness), rows, found.transform, found.pivot, found.softness, gate);
     const RigidTransform since = back.then(found.transform);
     prior.present << found.pivot - start.at(centre.transpose()), motion_about(found.pivot, since).tail<3>(),
         found.softness;
@@ -160,7 +183,7 @@ Fit fit(const Problem& problem, const RigidTransform& start, const Belief& belie
     found.pivot += next.step.head<3>();
     found.softness += next.step[6];
     found.softness_sd = std::sqrt(next.covariance(6, 6));
-    found.covariance = next.covariance.topLeftCorner<6, 6>();
+    found.covariance = (1 + 6 / next.effective_points) * next.covariance.topLeftCorner<6, 6>();
     found.misfit_mm = next.misfit_mm;
     found.misfit_length_mm = next.length_mm;
     found.effective_points = next.effective_points;

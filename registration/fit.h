@@ -27,7 +27,9 @@ struct Belief {
 /// an isotropic random displacement field seen along the normals (landmarks: along each axis). What is rigid has the
 /// spread rigid_sigma_mm over 40 mm in its place. Misfit and length are not known: the answer is the mean over a grid
 /// of both, weighted by the evidence of each (Rasmussen and Williams 2006, eq. 2.30 with explicit basis functions
-/// 2.42), and the covariance includes how far the answers differ. Softness has the prior 0 ± 0.3.
+/// 2.42), and the covariance includes how far the answers differ. No model is believed to be better than 0.8 mm, and
+/// the covariance grows by 1 + 6/effective_points, as six numbers were taken from so few. Softness has the prior 0 ±
+/// 0.3.
 /// @param start  near the answer
 Fit fit(const Problem& problem, const RigidTransform& start, const Belief& belief);
 

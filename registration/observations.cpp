@@ -54,9 +54,9 @@ Observations observe(const Problem& problem, const std::vector<int>& rows, const
                             displacement = matches.displacement.row(at);
       const bool border = matches.border[q];
       if (matches.distance_mm[at] > gate.reach_mm || (border ? !gate.with_border : !matches.facing[q])) continue;
-      const Eigen::Vector3d off = point - body - softness * displacement,
-                            along = border && off.norm() > 0 ? Eigen::Vector3d(off.normalized())
-                                                             : Eigen::Vector3d(matches.normal.row(at));
+      const Eigen::Vector3d off = point - body, along = border && off.norm() > 0
+                                                            ? Eigen::Vector3d(off.normalized())
+                                                            : Eigen::Vector3d(matches.normal.row(at));
       writer.add(point - pivot, body, along, displacement, along.dot(off), problem.noise_mm, matches.rigid[q]);
     }
   }

@@ -27,7 +27,7 @@ struct Gate {
 };
 
 /// @param rows      of the problem's points
-/// @param softness  the present one
+/// @param softness  the present one of the landmarks; the problem's skin is taken as it is
 Observations observe(const Problem& problem, const std::vector<int>& rows, const RigidTransform& placement,
                      const Eigen::Vector3d& pivot, double softness, const Gate& gate);
 

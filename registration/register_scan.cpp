@@ -9,6 +9,7 @@
 
 #include "calibration/noise.h"
 #include "common/error.h"
+#include "common/statistics.h"
 #include "registration/coarse.h"
 #include "registration/match.h"
 #include "registration/readings.h"
@@ -47,9 +48,10 @@ double noise_mm(const Problem& problem, const RigidTransform& placement) {
 
 std::vector<Placement> placements(const Problem& problem, const RigidTransform& start, bool& searched_far) {
   constexpr double good_mm = 4;
-  if (!has_surface(problem)) return {{start, landmark_rms_mm(problem, start)}};
+  // Landmarks say which of several places is meant.
+  if (!has_surface(problem) || problem.landmarks.size() >= 3) return {{start, landmark_rms_mm(problem, start)}};
   std::vector<Placement> found = search_near(problem, start);
-  if (problem.landmarks.size() >= 3 || found.front().score_mm < good_mm) return found;
+  if (found.front().score_mm < good_mm) return found;
   const std::vector<Placement> far = search_far(problem);
   // What lies near where it was said to lie is believed unless another place fits far better.
   if (far.front().score_mm > found.front().score_mm / 2) return found;
@@ -112,8 +114,7 @@ Registration register_scan(Problem problem, const RigidTransform& given, bool no
   if (!noise_known && has_surface(problem)) problem.noise_mm = noise_mm(problem, places.front().transform);
   found.noise_mm = problem.noise_mm;
   const Belief& belief = landmarks ? landmark_belief : given_belief;
-  // Landmarks say which of several places is meant: the fit begins where they put the scan.
-  found.fit = fit(problem, landmarks ? start : places.front().transform, belief);
+  found.fit = fit(problem, places.front().transform, belief);
   if (has_surface(problem)) {
     const std::vector<int> rows = drawn_rows(problem.points.rows(), judged_points);
     const Matches matches = match(problem, rows, found.fit.transform);
@@ -125,6 +126,7 @@ Registration register_scan(Problem problem, const RigidTransform& given, bool no
   found.landmarks_before_mm = landmark_rms_mm(problem, given);
   found.landmarks_after_mm = landmark_rms_mm(problem, found.fit.transform);
   found.axes = named_axis_change(found.fit.transform.rotation);
+  found.given_inside = mahalanobis_squared(found.fit, given) <= chi_squared_quantile(6, 0.95);
   check_fits(found, problem, name);
   return found;
 }

@@ -17,6 +17,7 @@ struct Registration {
   double overlap = 0;                                      ///< overlap() where found
   int other_places = 0;       ///< other placements that fit nearly as well; the covariance includes them
   std::string axes;           ///< named_axis_change() of the turn
+  bool given_inside = false;  ///< the 95 % region holds the given place
   bool searched_far = false;  ///< nothing fitted near the given place
 
   bool worse_than_given() const { return after_mm > before_mm || landmarks_after_mm > landmarks_before_mm; }

@@ -156,6 +156,7 @@ class RegisterTool : public Tool {
     figures["softness_sd"] = found.fit.softness_sd;
     figures["other_places"] = found.other_places;
     figures["axes"] = found.axes;
+    figures["given_inside_95"] = found.given_inside;
     figures["landmarks"] = Json::array();
     for (const auto& landmark : in.problem.landmarks)
       figures["landmarks"].push_back({{"name", landmark.name},
@@ -211,10 +212,14 @@ class RegisterTool : public Tool {
           weak.turn ? "turn about" : "shift along", "the axis", weak.axis.x(), weak.axis.y(), weak.axis.z(),
           weak.turn ? weak.sd * degrees : weak.sd, weak.turn ? "degrees" : "mm"));
     if (!found.worse_than_given()) return Outcome::done;
-    run.warn(
-        fmt::format("the scan lies no better than before: RMS {:.2f} mm before, {:.2f} after; landmarks {:.2f} before, "
-                    "{:.2f} after",
-                    found.before_mm, found.after_mm, found.landmarks_before_mm, found.landmarks_after_mm));
+    const std::string figures =
+        fmt::format("RMS {:.2f} mm before, {:.2f} after; landmarks {:.2f} before, {:.2f} after", found.before_mm,
+                    found.after_mm, found.landmarks_before_mm, found.landmarks_after_mm);
+    if (found.given_inside) {
+      run.warn("the scan fitted as well where it was given, which the 95 % region holds; keep it there: " + figures);
+      return Outcome::done;
+    }
+    run.warn("the scan lies no better than before: " + figures);
     return Outcome::target_not_met;
   }
 
