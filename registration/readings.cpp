@@ -10,6 +10,7 @@
 
 #include "common/error.h"
 #include "registration/coarse.h"
+#include "registration/match.h"
 
 namespace supine::registration {
 namespace {
@@ -121,6 +122,25 @@ std::string nearest_change(const Eigen::Matrix3d& rotation, bool mirror, double 
   return {};
 }
 
+/// One axis negated, or two swapped, about the origin and about the scan's centre.
+std::vector<RigidTransform> mirrored_starts(const Problem& problem) {
+  const Eigen::Vector3d centre = problem.points.colwise().mean();
+  std::vector<RigidTransform> starts;
+  for (const Eigen::Matrix3d& change : axis_changes(true)) {
+    if (std::abs(change.trace() - 1) > 1e-9) continue;
+    starts.push_back({change, Eigen::Vector3d::Zero()});
+    starts.push_back({change, centre - change * centre});
+  }
+  return starts;
+}
+
+Problem mirrored_by(Problem problem, const RigidTransform& change) {
+  problem.points = change.apply(problem.points);
+  problem.normals = change.apply_to_directions(problem.normals);
+  problem.landmarks.clear();
+  return problem;
+}
+
 }  // namespace
 
 void check_unit(const Problem& problem, const std::string& name) {
@@ -142,15 +162,14 @@ void check_mirror(const Problem& problem, const RigidTransform& placement, doubl
     mirrored_mm = rms_mm(tables, true);
     mirrored = best_rigid(tables.scan, tables.image, tables.weight, true);
   } else if (given_mm > bad_mm && (problem.target.skin || problem.target.rigid)) {
-    for (const Eigen::Matrix3d& change : axis_changes(true)) {
-      Problem turned = problem;
-      turned.points = problem.points * change.transpose();
-      turned.normals = problem.normals * change.transpose();
-      turned.landmarks.clear();
-      const Placement found = search_near(turned, {}).front();
-      if (found.score_mm >= mirrored_mm) continue;
-      mirrored_mm = found.score_mm;
-      mirrored.rotation = found.transform.rotation * change;
+    const std::vector<int> rows = drawn_rows(problem.points.rows(), 240);
+    for (const RigidTransform& start : mirrored_starts(problem)) {
+      const Problem turned = mirrored_by(problem, start);
+      const RigidTransform found = icp(turned, rows, {}, 30);
+      const double score = match_score_mm(match(turned, rows, found));
+      if (score >= mirrored_mm) continue;
+      mirrored_mm = score;
+      mirrored.rotation = found.rotation * start.rotation;
     }
   }
   if (given_mm <= bad_mm || mirrored_mm > gain * given_mm) return;
