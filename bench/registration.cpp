@@ -96,7 +96,7 @@ void misplace(Problem& problem, const RigidTransform& by) {
   for (registration::Landmark& l : problem.landmarks) l.scan = by.at(l.scan);
 }
 
-/// Largest distance between two placements of the scan, and their RMS.
+/// How far two placements of the scan are apart.
 struct Off {
   double rms_mm, turn_deg;
 };
