@@ -19,7 +19,7 @@ DEVELOPER ?= OFF
 # One compiler per core, as far as 1.5 GB of free memory for each allow: heavy templates.
 JOBS ?= $(shell awk -v cores=$$(nproc) '/^MemAvailable/ { m = int($$2 / 1572864); n = m < cores ? m : cores; print n < 1 ? 1 : n }' /proc/meminfo)
 
-stages := segment reconstruct decimate mesh simulate compare calibrate diagnose ladder report summary
+stages := segment reconstruct decimate mesh simulate register compare calibrate diagnose ladder report summary
 run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 
 # Data that the repository does not hold: docs/data.md.

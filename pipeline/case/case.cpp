@@ -21,9 +21,10 @@ constexpr double unit_tolerance = 1e-3;  // of a gravity vector's length
 constexpr double same_direction_rad = 1e-3;
 
 /// Names of files that tools write; a pose of that name would overwrite them.
-const std::vector<std::string> reserved_names = {
-    "undeformed", "mesh",        "labels", "breast",  "muscle", "gland",     "tumour",      "coarse", "comparison",
-    "scan",       "calibration", "model",  "history", "ladder", "diagnosis", "sensitivity", "report"};
+const std::vector<std::string> reserved_names = {"undeformed",  "mesh",   "labels",       "breast",     "muscle",
+                                                 "gland",       "tumour", "coarse",       "comparison", "scan",
+                                                 "calibration", "model",  "history",      "ladder",     "diagnosis",
+                                                 "sensitivity", "report", "registration", "registered"};
 
 Eigen::Vector3d read_gravity(const TomlReader& pose, const std::string& frame) {
   const auto given = pose.vector("gravity");
@@ -159,6 +160,21 @@ void read_calibration(const TomlReader& file, Case& result) {
   result.calibrated_poses = *names;
 }
 
+void read_register(const TomlReader& file, Case& result) {
+  const auto table = file.sub_table("register");
+  if (!table) return;
+  table->allow({"on", "rigid"});
+  if (const auto on = table->texts("on")) {
+    if (on->empty()) table->fail("on", "names nothing to lay the scan on; leave the key out for landmarks and model");
+    const std::vector<std::string> known = {"landmarks", "model", "support"};
+    for (const std::string& name : *on)
+      if (std::find(known.begin(), known.end(), name) == known.end())
+        table->fail("on", fmt::format("\"{}\" is none of {}", name, listed(known)));
+    result.register_on.on = *on;
+  }
+  result.register_on.rigid = table->texts("rigid").value_or(std::vector<std::string>());
+}
+
 void read_head(const TomlReader& file, Case& result) {
   const auto head = file.sub_table("case");
   if (!head) file.fail("case", "table [case] is missing: it says name, frame and side");
@@ -190,7 +206,7 @@ Case read_case(const fs::path& folder) {
         fmt::format("{} is not there; a case is a folder with a case.toml (docs/case-file.md)", path.string()));
   const toml::table table = parse_toml(path);
   const TomlReader file(table, path, "");
-  file.allow({"case", "image", "segmentation", "pose", "landmarks", "calibration"});
+  file.allow({"case", "image", "segmentation", "pose", "landmarks", "calibration", "register"});
   Case result;
   result.folder = folder;
   read_head(file, result);
@@ -198,6 +214,7 @@ Case read_case(const fs::path& folder) {
   read_poses(file, result);
   read_landmark_table(file, result);
   read_calibration(file, result);
+  read_register(file, result);
   return result;
 }
 

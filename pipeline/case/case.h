@@ -41,6 +41,12 @@ struct Pose {
   Known known;
 };
 
+/// How supine-register lays a scan on the body.
+struct RegisterOn {
+  std::vector<std::string> on;     ///< of landmarks, model, support; empty: landmarks where there are, and the model
+  std::vector<std::string> rigid;  ///< names of landmarks that do not move with the tissue
+};
+
 /// case.toml: what was measured. Coordinates are LPS after reading, whatever `frame` says.
 struct Case {
   std::filesystem::path folder;
@@ -60,6 +66,7 @@ struct Case {
   std::vector<Pose> poses;  ///< prone first, supine second, then in file order
   std::optional<std::filesystem::path> prone_landmarks;
   std::vector<std::string> calibrated_poses = {"supine"};
+  RegisterOn register_on;
 
   const Pose& pose(std::string_view name) const;  ///< @throws InputError listing the poses there are
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/tool/tool.h"
+#include "reconstruction/surface.h"
 
 namespace supine::pipeline {
 
@@ -34,6 +35,15 @@ void draw_distances(const std::filesystem::path& file, const std::string& title,
 /// The boundary of a tetrahedral mesh (.vtu) with its edges, coloured by `region`: from the front and from behind.
 /// @throws InputError  as above
 void draw_mesh(const std::filesystem::path& file, const std::string& title, const std::filesystem::path& png);
+
+/// A body with a scan on it, as given and as found.
+struct Placed {
+  reconstruction::Surface body;           ///< only its triangles are drawn
+  reconstruction::Surface before, after;  ///< the scan; triangles or bare points
+};
+/// Body grey, scan orange where given, blue where found; from the front and from the left.
+/// @throws InputError  as above
+void draw_placement(const Placed& placed, const std::string& title, const std::filesystem::path& png);
 
 struct Histogram {
   std::string title, axis;                            ///< axis with its unit

@@ -149,7 +149,8 @@ def check_links(page):
 
 # A path names a file of a room by its end, as in `voxels.h`, or from the top of the source or from the page's folder.
 PATH = re.compile(r"(?:[\w.-]+/)*[\w.-]+\.(?:h|cpp|py|sh|awk|cmake|mjs|md)|(?:[\w.-]+/)+[\w.-]*|Makefile")
-ROOMS = ("bench", "calibration", "common", "diagnosis", "docs", "meshing", "phantom", "pipeline", "reconstruction", "samples",
+ROOMS = ("bench", "calibration", "common", "diagnosis", "docs", "meshing", "phantom", "pipeline", "reconstruction", "registration",
+         "samples",
          "segmentation", "simulation", "tests")
 # Made by a run or by the reader, or the reader's own names.
 MADE = re.compile(r"(^|/)(out|build|answers)(/|$)|^(ladder|calibrated|overlays|dir|own|\d+)/|(^|[/_-])[A-Z]{2,}(?=[/_.-]|$)(?<!README)"

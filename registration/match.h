@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "registration/problem.h"
+
+namespace supine::registration {
+
+/// Distances further than this count as this in match_score_mm(): a point that meets nothing.
+constexpr double lost_mm = 10;
+
+/// The body's closest points to points of the scan.
+struct Matches {
+  Points point, normal, displacement;  ///< #Q by 3; of the body; the displacement of rigid surfaces is 0
+  Eigen::VectorXd distance_mm;         ///< #Q, ≥ 0
+  std::vector<bool> border;            ///< the closest point lies on the border of the surface
+  std::vector<bool> facing;            ///< normals within 60° in either sense, or none known
+  std::vector<bool> rigid;
+};
+
+/// @param rows       of the problem's points
+/// @param placement  scan → image
+Matches match(const Problem& problem, const std::vector<int>& rows, const RigidTransform& placement);
+
+/// Root of the mean of min(d, lost_mm)², border and turned points counting as lost; smaller fits better.
+double match_score_mm(const Matches& matches);
+
+/// Share of points that meet the body: inside it, facing it, closer than lost_mm.
+double overlap(const Matches& matches);
+
+/// @p count rows of @p of, drawn with a fixed seed, ascending; all when there are fewer.
+std::vector<int> drawn_rows(Eigen::Index of, int count);
+
+}  // namespace supine::registration
