@@ -64,6 +64,14 @@ class CaseFile : public testing::Test {
   TemporaryFolder folder_;
 };
 
+TEST_F(CaseFile, SaysWhatAScanIsLaidOn) {
+  EXPECT_TRUE(read(good).register_on.on.empty());
+  const Case c = read(replaced(good, "[calibration]",
+                               "[register]\non = [\"support\", \"landmarks\"]\nrigid = [\"sternum\"]\n[calibration]"));
+  EXPECT_EQ(c.register_on.on, (std::vector<std::string>{"support", "landmarks"}));
+  EXPECT_EQ(c.register_on.rigid, std::vector<std::string>{"sternum"});
+}
+
 TEST_F(CaseFile, SaysHowWellMeasurementsAreKnown) {
   std::string text = replaced(good, "noise_mm = 0.7",
                               "noise_mm = 0.7\nregistration_mm = 0.4\ngravity_deg = 1\nbreath_mm = 0.5\n"
@@ -238,6 +246,10 @@ INSTANTIATE_TEST_SUITE_P(
                 {"segmentation_mm = 11", "0 to 10"}},
         BadCase{"NoiseNotPositive", "noise_mm = 0.7", "noise_mm = -0.7", {"noise_mm = -0.7", "> 0 mm"}},
         BadCase{"LandmarksWithoutProne", "prone = \"prone_landmarks.csv\"", "", {"[pose.supine] landmarks", "prone"}},
+        BadCase{"RegisterOnUnknown",
+                "[calibration]",
+                "[register]\non = [\"skin\"]\n[calibration]",
+                {"[register]", "\"skin\" is none of landmarks, model or support"}},
         BadCase{"CalibratedPoseUnknown", "poses = [\"supine\"]", "poses = [\"upright\"]", {"poses", "[pose.upright]"}},
         BadCase{"CalibratedPoseHasNoScan",
                 "poses = [\"supine\"]",
