@@ -6,6 +6,7 @@
 #include <vtkCellType.h>
 #include <vtkCommand.h>
 #include <vtkDataArray.h>
+#include <vtkExecutive.h>
 #include <vtkFieldData.h>
 #include <vtkIdList.h>
 #include <vtkNew.h>
@@ -17,6 +18,7 @@
 #include <vtkXMLUnstructuredGridReader.h>
 
 #include "common/error.h"
+#include "common/trial_process.h"
 #include "meshing/mesh_check.h"
 #include "meshing/topology.h"
 #include "segmentation/tissue.h"
@@ -52,10 +54,16 @@ struct VtuReader::Grid {
 
 VtuReader::VtuReader(const std::filesystem::path& file) : file_(file), grid_(std::make_unique<Grid>()) {
   if (!std::filesystem::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
+  check_survivable(file, [&file] {
+    vtkNew<vtkXMLUnstructuredGridReader> trial;
+    trial->SetFileName(file.c_str());
+    trial->Update();
+  });
   vtkNew<vtkXMLUnstructuredGridReader> reader;
   vtkNew<FirstError> errors;
   vtkNew<FirstError> parse_errors;
   reader->AddObserver(vtkCommand::ErrorEvent, errors);
+  reader->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, errors);
   reader->SetParserErrorObserver(parse_errors);
   reader->SetReaderErrorObserver(errors);
   reader->SetFileName(file.c_str());
@@ -93,6 +101,9 @@ Table VtuReader::point_array(const std::string& name, int components) const {
     throw InputError(fmt::format("{}: point array \"{}\" has {} components, {} are expected", file_.string(), name,
                                  array->GetNumberOfComponents(), components));
   }
+  if (array->GetNumberOfTuples() != grid_->vtk->GetNumberOfPoints())
+    throw InputError(fmt::format("{}: point array \"{}\" has {} entries, the file has {} points", file_.string(), name,
+                                 array->GetNumberOfTuples(), grid_->vtk->GetNumberOfPoints()));
   return to_table(*array);
 }
 
@@ -108,7 +119,21 @@ NamedTables VtuReader::point_arrays() const {
 Table VtuReader::cell_column(const std::string& name) const {
   vtkDataArray* array = grid_->vtk->GetCellData()->GetArray(name.c_str());
   if (array == nullptr) throw InputError(fmt::format("{}: has no cell array \"{}\"", file_.string(), name));
+  if (array->GetNumberOfTuples() != grid_->vtk->GetNumberOfCells() || array->GetNumberOfComponents() != 1)
+    throw InputError(fmt::format("{}: cell array \"{}\" has {} × {} numbers, the file has {} cells", file_.string(),
+                                 name, array->GetNumberOfTuples(), array->GetNumberOfComponents(),
+                                 grid_->vtk->GetNumberOfCells()));
   return to_table(*array);
+}
+
+void VtuReader::check_nodes(long long cell, const Indices& of_cell, int wanted) const {
+  if (of_cell.cols() != wanted)
+    throw InputError(
+        fmt::format("{}: cell {} has {} nodes; its kind has {}", file_.string(), cell, of_cell.cols(), wanted));
+  const auto points = static_cast<int>(grid_->vtk->GetNumberOfPoints());
+  for (const int node : of_cell.reshaped())
+    if (node < 0 || node >= points)
+      throw InputError(fmt::format("{}: cell {} names node {}, the file has {}", file_.string(), cell, node, points));
 }
 
 void VtuReader::read_topology(TetMesh& mesh) const {
@@ -133,9 +158,10 @@ void VtuReader::read_topology(TetMesh& mesh) const {
                       file_.string(), c, grid.GetCellType(c), wanted));
     }
     grid.GetCellPoints(c, nodes);
-    for (vtkIdType k = 0; k < nodes->GetNumberOfIds(); ++k) {
-      (is_tet ? mesh.cells(c, k) : mesh.faces(c - cells, k)) = static_cast<int>(nodes->GetId(k));
-    }
+    Indices of_cell(1, nodes->GetNumberOfIds());
+    for (vtkIdType k = 0; k < nodes->GetNumberOfIds(); ++k) of_cell(0, k) = static_cast<int>(nodes->GetId(k));
+    check_nodes(c, of_cell, static_cast<int>(is_tet ? mesh.cells.cols() : mesh.faces.cols()));
+    (is_tet ? mesh.cells.row(c) : mesh.faces.row(c - cells)) = of_cell;
   }
   set_face_cells(mesh);
 }

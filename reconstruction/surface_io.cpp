@@ -30,6 +30,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "common/trial_process.h"
 #include "reconstruction/ply_file.h"
 #include "reconstruction/surface_text.h"
 
@@ -73,6 +74,11 @@ class VtkErrors {
 
 template <class Reader>
 vtkSmartPointer<vtkPolyData> run_reader(const std::filesystem::path& file) {
+  check_survivable(file, [&file] {
+    vtkNew<Reader> trial;
+    trial->SetFileName(file.c_str());
+    trial->Update();
+  });
   vtkNew<Reader> reader;
   reader->SetFileName(file.c_str());
   const VtkErrors errors(*reader);

@@ -16,6 +16,7 @@
 #include <algorithm>
 
 #include "common/error.h"
+#include "common/trial_process.h"
 #include "segmentation/formats/image_formats.h"
 #include "segmentation/formats/image_io.h"
 #include "segmentation/formats/labels_io.h"
@@ -64,6 +65,11 @@ class ErrorCollector {
 };
 
 void update(vtkXMLImageDataReader& reader, const std::filesystem::path& file) {
+  check_survivable(file, [&file] {
+    vtkNew<vtkXMLImageDataReader> trial;
+    trial->SetFileName(file.c_str());
+    trial->Update();
+  });
   ErrorCollector errors(reader);
   reader.SetReaderErrorObserver(errors.command());
   reader.SetParserErrorObserver(errors.command());

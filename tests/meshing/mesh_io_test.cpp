@@ -120,6 +120,51 @@ TEST_F(MeshFile, RefusesAnInvertedTetrahedronNamingTheFile) {
   }
 }
 
+/// A file of one tetrahedron, or what is said to be one.
+std::string one_cell(const std::string& connectivity, int nodes, int type) {
+  return "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\"><UnstructuredGrid>"
+         "<Piece NumberOfPoints=\"5\" NumberOfCells=\"1\"><Points><DataArray type=\"Float64\" "
+         "NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 0 1 0 0 0 1 1 1 1</DataArray></Points><Cells>"
+         "<DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">" +
+         connectivity + "</DataArray><DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">" +
+         std::to_string(nodes) + "</DataArray><DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">" +
+         std::to_string(type) + "</DataArray></Cells></Piece></UnstructuredGrid></VTKFile>";
+}
+
+TEST_F(MeshFile, RefusesCellsWithOtherNodesThanTheirKindHas) {
+  const auto refusal = [this](const std::string& text) {
+    std::ofstream(folder_ / "cell.vtu") << text;
+    try {
+      meshing::read_mesh(folder_ / "cell.vtu");
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_NE(refusal(one_cell("0 1 2 3 4", 5, 10)).find("cell 0 has 5 nodes; its kind has 4"), std::string::npos);
+  EXPECT_NE(refusal(one_cell("0 1 2", 3, 10)).find("cell 0 has 3 nodes; its kind has 4"), std::string::npos);
+  EXPECT_NE(refusal(one_cell("0 1 2 3", 4, 24)).find("cell 0 has 4 nodes; its kind has 10"), std::string::npos);
+  EXPECT_NE(refusal(one_cell("0 1 2 7", 4, 10)).find("cell 0 names node 7, the file has 5"), std::string::npos);
+  EXPECT_NE(refusal(one_cell("0 1 2 -1", 4, 10)).find("cell 0 names node -1"), std::string::npos);
+}
+
+TEST_F(MeshFile, DamagedIsReadOrRefusedNeverWorse) {
+  meshing::write_mesh(mixed_mesh(), folder_ / "mesh.vtu");
+  const std::string whole = bytes(folder_ / "mesh.vtu");
+  int refused = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 1 + at / 12) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 2);
+    std::ofstream(folder_ / "damaged.vtu", std::ios::binary) << damaged;
+    try {
+      meshing::read_mesh(folder_ / "damaged.vtu");
+    } catch (const InputError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 20);
+}
+
 TEST_F(MeshFile, RefusesAFolderItCannotWriteTo) {
   EXPECT_THROW(meshing::write_mesh(mixed_mesh(), folder_ / "none" / "mesh.vtu"), InputError);
 }

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "common/trial_process.h"
+
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <stdexcept>
+#include <vector>
+
+#include "common/error.h"
+
+namespace supine {
+namespace {
+
+TEST(TrialProcess, LetsThroughWhatComesToItsEnd) {
+  int here = 0;
+  EXPECT_NO_THROW(check_survivable("a.vtu", [&here] { here = 1; }));
+  EXPECT_EQ(here, 0) << "another process did it";
+  EXPECT_NO_THROW(check_survivable("a.vtu", [] { throw std::runtime_error("for whoever reads again"); }));
+}
+
+TEST(TrialProcess, NamesTheFileThatBringsItsReaderDown) {
+  for (const int signal : {SIGSEGV, SIGABRT, SIGFPE}) try {
+      check_survivable("scan.vtp", [signal] { std::raise(signal); });
+      ADD_FAILURE() << signal;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("scan.vtp: damaged"), std::string::npos) << error.what();
+    }
+}
+
+TEST(TrialProcess, RefusesCountsThatNoFileOfItsSizeCanHold) {
+  try {
+    check_survivable("huge.vtu", [] { std::vector<char> all(std::size_t{1} << 40); });
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("more memory"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace supine
