@@ -125,13 +125,10 @@ std::vector<LandmarkError> compare_landmarks(const Landmarks& predicted, const L
   std::vector<LandmarkError> errors;
   std::vector<std::string> unknown;
   for (std::size_t i = 0; i < measured.names.size(); ++i) {
-    const auto found = std::find(predicted.names.begin(), predicted.names.end(), measured.names[i]);
-    if (found == predicted.names.end()) {
+    if (const auto row = predicted.row_of(measured.names[i]))
+      errors.push_back({measured.names[i], (predicted.points.row(*row) - measured.points.row(i)).norm()});
+    else
       unknown.push_back(measured.names[i]);
-      continue;
-    }
-    const auto row = found - predicted.names.begin();
-    errors.push_back({measured.names[i], (predicted.points.row(row) - measured.points.row(i)).norm()});
   }
   if (!unknown.empty()) {
     throw InputError(

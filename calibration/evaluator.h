@@ -8,6 +8,7 @@
 
 #include "calibration/distance_figures.h"
 #include "calibration/free_parameters.h"
+#include "calibration/measured_landmarks.h"
 #include "calibration/model_skin.h"
 #include "calibration/scan.h"
 #include "calibration/scan_motion.h"
@@ -17,13 +18,6 @@
 #include "simulation/solve/sensitivities.h"
 
 namespace supine::calibration {
-
-/// Points of the tissue whose places were measured in the imaged pose and in another; #L by 3, mm.
-struct MeasuredLandmarks {
-  std::vector<std::string> names;
-  Points imaged, measured;
-  Eigen::VectorXd sigma_mm;  ///< of both places together, 1 sigma along each axis, > 0
-};
 
 /// A measured surface and the pose it was measured in.
 struct Measurement {

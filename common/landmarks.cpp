@@ -78,6 +78,12 @@ Landmarks read_landmarks(const std::filesystem::path& file, const std::string& f
   return landmarks;
 }
 
+std::optional<Eigen::Index> Landmarks::row_of(const std::string& name) const {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) return std::nullopt;
+  return found - names.begin();
+}
+
 void write_landmarks(const Landmarks& landmarks, const std::filesystem::path& file) {
   std::ofstream stream(file);
   const bool with_sigma = landmarks.sigma_mm.size() > 0;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,9 @@ struct Landmarks {
   std::vector<std::string> names;
   Points points;
   Eigen::VectorXd sigma_mm = {};  ///< 1 sigma of each point's error along every axis; empty: not stated
+
+  /// Of the point of that name; none where there is no such point.
+  std::optional<Eigen::Index> row_of(const std::string& name) const;
 };
 
 /// Reads a CSV file with the header `name,x,y,z` or `name,x,y,z,sigma_mm`, mm, in @p frame (LPS or RAS; converted to

@@ -13,4 +13,14 @@ namespace supine {
 ///   in 300 s
 void check_survivable(const std::filesystem::path& file, const std::function<void()>& read);
 
+/// The same with a reader of VTK for one file.
+template <class Reader>
+void check_survivable_by(const std::filesystem::path& file) {
+  check_survivable(file, [&file] {
+    Reader* reader = Reader::New();  // goes with the process
+    reader->SetFileName(file.c_str());
+    reader->Update();
+  });
+}
+
 }  // namespace supine

@@ -104,8 +104,9 @@ calibration::Prediction predicted_on(const calibration::MeasuredScene& scene, co
 Eigen::VectorXd distances_of(const Residuals& residuals, const calibration::Prediction& prediction) {
   Eigen::VectorXd there(residuals.size());
   for (Eigen::Index r = 0; r < residuals.size(); ++r) {
-    const auto& [scan_points, distances, to_scan, landmarks] =
-        prediction.poses[static_cast<std::size_t>(residuals.pose[r])];
+    const calibration::PosePrediction& pose = prediction.poses[static_cast<std::size_t>(residuals.pose[r])];
+    const auto& distances = pose.distances;
+    const auto& landmarks = pose.landmarks;
     const int point = residuals.point[r];
     if (residuals.is_landmark(r)) {
       there[r] = landmarks.measured(point / 3, point % 3) - landmarks.predicted(point / 3, point % 3);

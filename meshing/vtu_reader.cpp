@@ -54,11 +54,7 @@ struct VtuReader::Grid {
 
 VtuReader::VtuReader(const std::filesystem::path& file) : file_(file), grid_(std::make_unique<Grid>()) {
   if (!std::filesystem::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
-  check_survivable(file, [&file] {
-    vtkNew<vtkXMLUnstructuredGridReader> trial;
-    trial->SetFileName(file.c_str());
-    trial->Update();
-  });
+  check_survivable_by<vtkXMLUnstructuredGridReader>(file);
   vtkNew<vtkXMLUnstructuredGridReader> reader;
   vtkNew<FirstError> errors;
   vtkNew<FirstError> parse_errors;

@@ -37,8 +37,7 @@ struct PlyHeader {
   long long lines = 0;  ///< of the header
 };
 
-constexpr long long least_corners = 3, most_corners = 255;
-constexpr std::size_t longest_line = 4000;  // what VTK's reader holds
+constexpr long long least_corners = 3;
 
 struct PlyType {
   std::size_t bytes;
@@ -83,9 +82,6 @@ class AsciiNumbers : public Numbers {
     if (!std::getline(in_, text))
       throw InputError(fmt::format("{}: cut short: it ends before line {}, its counts need more; copy the file again",
                                    file_.string(), line_));
-    if (text.size() > longest_line)
-      throw InputError(
-          fmt::format("{}: {} has {} characters (at most {})", file_.string(), place(), text.size(), longest_line));
     words_ = words_of(text);
     at_ = 0;
   }
@@ -166,10 +162,9 @@ std::vector<int> read_list(Numbers& numbers, const PlyProperty& property, bool c
                            const std::filesystem::path& file) {
   const double count = numbers.next(*type_of(property.count_type));
   const double least = corners ? least_corners : 0;
-  if (!(count >= least && count <= most_corners) || count != std::floor(count))
-    throw InputError(fmt::format("{}: {}: {} {} (from {} to {})", file.string(), numbers.place(),
-                                 corners ? "a face of this many corners:" : "a list this long:", count, least,
-                                 most_corners));
+  if (!(count >= least) || count != std::floor(count))
+    throw InputError(fmt::format("{}: {}: {} {} (at least {})", file.string(), numbers.place(),
+                                 corners ? "a face of this many corners:" : "a list this long:", count, least));
   std::vector<int> face;
   for (long long k = 0; k < static_cast<long long>(count); ++k) {
     const double index = numbers.next(*type_of(property.type));

@@ -74,11 +74,7 @@ class VtkErrors {
 
 template <class Reader>
 vtkSmartPointer<vtkPolyData> run_reader(const std::filesystem::path& file) {
-  check_survivable(file, [&file] {
-    vtkNew<Reader> trial;
-    trial->SetFileName(file.c_str());
-    trial->Update();
-  });
+  check_survivable_by<Reader>(file);
   vtkNew<Reader> reader;
   reader->SetFileName(file.c_str());
   const VtkErrors errors(*reader);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/case/measured_case.h"
 
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -84,40 +84,36 @@ void read_scan(Run& run, MeasuredCase& in, const Pose& pose, std::size_t row) {
   list.push_back(Measurement{{pose.name, pose.gravity}, std::move(scan), pose.noise_mm, std::move(standing_out)});
 }
 
-/// 1 sigma of the difference of two places, as far as the files state it.
-double sigma_of(const Landmarks& prone, std::size_t a, const Landmarks& posed, std::size_t b) {
-  constexpr double usual_mm = 1.5;
-  const auto stated = [](const Landmarks& file, std::size_t row) {
-    return file.sigma_mm.size() > 0 ? file.sigma_mm[static_cast<Eigen::Index>(row)] : 0.0;
-  };
-  const double both = std::hypot(stated(prone, a), stated(posed, b));
-  return both > 0 ? both : usual_mm;
-}
-
-calibration::MeasuredLandmarks paired(const Landmarks& prone, const Landmarks& posed, const fs::path& file) {
-  const auto count = static_cast<Eigen::Index>(posed.names.size());
-  calibration::MeasuredLandmarks pairs{posed.names, Points(count, 3), posed.points, Eigen::VectorXd(count)};
-  for (std::size_t i = 0; i < posed.names.size(); ++i) {
-    const auto found = std::find(prone.names.begin(), prone.names.end(), posed.names[i]);
-    if (found == prone.names.end())
-      throw InputError(fmt::format(
-          "{}: landmark '{}' is not among those of [landmarks] prone ({}): it has the same name in every pose",
-          file.string(), posed.names[i], fmt::join(prone.names, ", ")));
-    const auto row = static_cast<std::size_t>(found - prone.names.begin());
-    pairs.imaged.row(static_cast<Eigen::Index>(i)) = prone.points.row(found - prone.names.begin());
-    pairs.sigma_mm[static_cast<Eigen::Index>(i)] = sigma_of(prone, row, posed, i);
+/// What @p work says of a file of landmarks, with its name.
+template <class Work>
+auto of_landmarks(const Pose& pose, Work work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", pose.landmarks->string(), error.what()));
   }
-  return pairs;
 }
 
 void read_pose_landmarks(Run& run, MeasuredCase& in, const std::vector<Pose>& poses) {
   const Case& c = in.description;
   if (!c.prone_landmarks) return;
-  const Landmarks prone = read_landmarks(run.input(*c.prone_landmarks), c.frame);
-  for (const Pose& pose : poses)
-    if (pose.landmarks)
-      in.landmarks.emplace(pose.name,
-                           paired(prone, read_landmarks(run.input(*pose.landmarks), c.frame), *pose.landmarks));
+  const Landmarks imaged = read_landmarks(run.input(*c.prone_landmarks), c.frame);
+  for (const Pose& pose : poses) {
+    if (!pose.landmarks) continue;
+    const Landmarks measured = read_landmarks(run.input(*pose.landmarks), c.frame);
+    in.landmarks.emplace(pose.name, of_landmarks(pose, [&] { return calibration::pair_landmarks(imaged, measured); }));
+  }
+}
+
+/// Of a pose, where the model as given does not speak against them; nullptr where it has none.
+const calibration::MeasuredLandmarks* believable_landmarks(const MeasuredCase& in, const std::string& pose) {
+  const auto found = in.landmarks.find(pose);
+  if (found == in.landmarks.end()) return nullptr;
+  const auto solved = std::find_if(in.start.poses.begin(), in.start.poses.end(),
+                                   [&pose](const simulation::PoseSolution& s) { return s.name == pose; });
+  const Points predicted = simulation::Embedding(in.mesh, found->second.imaged).at(solved->x);
+  of_landmarks(in.description.pose(pose), [&] { calibration::check_landmarks(found->second, predicted); });
+  return &found->second;
 }
 
 calibration::MeasuredScene scene_of(const MeasuredCase& in, bool whole, bool marked) {
@@ -125,10 +121,8 @@ calibration::MeasuredScene scene_of(const MeasuredCase& in, bool whole, bool mar
   for (const Measurement& m : in.fitted) scene.measurements.push_back(&m);
   for (const Measurement& m : in.held_out)
     if (whole) scene.measurements.push_back(&m);
-  for (const Measurement* m : scene.measurements) {
-    const auto found = in.landmarks.find(m->pose.name);
-    scene.landmarks.push_back(!marked || found == in.landmarks.end() ? nullptr : &found->second);
-  }
+  for (const Measurement* m : scene.measurements)
+    scene.landmarks.push_back(marked ? believable_landmarks(in, m->pose.name) : nullptr);
   return scene;
 }
 

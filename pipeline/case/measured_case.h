@@ -31,9 +31,10 @@ struct MeasuredCase {
   std::map<std::string, calibration::MeasuredLandmarks> landmarks;
   simulation::ChainSolution start;  ///< of the model as given; poses: fitted, then held out
 
-  /// Only the surfaces that are fitted, or all that is measured, landmarks included.
+  /// The surfaces that are fitted.
   calibration::MeasuredScene fitted_scene() const;
-  /// What is fitted and its landmarks.
+  /// What is fitted and its landmarks; all that is measured.
+  /// @throws InputError  landmarks that lie elsewhere than the model as given can have them (check_landmarks())
   calibration::MeasuredScene marked_scene() const;
   calibration::MeasuredScene whole_scene() const;
   /// Of each measurement of a scene: as the case says, or estimated from the distances to the given model.

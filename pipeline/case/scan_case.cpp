@@ -21,12 +21,6 @@ bool lies_on(const ScanCase& in, const char* what) {
 
 std::string toml_of(const Case& description) { return (description.folder / "case.toml").string(); }
 
-/// Row of @p name; −1 when it is not there.
-int row_of(const Landmarks& landmarks, const std::string& name) {
-  const auto at = std::find(landmarks.names.begin(), landmarks.names.end(), name);
-  return at == landmarks.names.end() ? -1 : static_cast<int>(at - landmarks.names.begin());
-}
-
 /// Unit normals of the scan's points, neighbours agreeing; zero where there is none.
 Points normals_of(const reconstruction::Surface& scan) {
   Triangles triangles = scan.triangles;
@@ -36,7 +30,7 @@ Points normals_of(const reconstruction::Surface& scan) {
 
 void check_rigid_names(const Case& description, const Landmarks& measured) {
   for (const std::string& name : description.register_on.rigid)
-    if (row_of(measured, name) < 0)
+    if (!measured.row_of(name))
       throw InputError(fmt::format("{}: [register] rigid names the landmark '{}', which the pose does not have; {}",
                                    toml_of(description), name, suggestion(name, measured.names)));
 }
@@ -53,18 +47,18 @@ void add_landmarks(const Case& description, const Pose& pose, const fs::path& sh
   const std::vector<std::string>& rigid = description.register_on.rigid;
   for (std::size_t l = 0; l < measured.names.size(); ++l) {
     const std::string& name = measured.names[l];
-    const int before = row_of(imaged, name), after = row_of(predicted, name);
+    const auto before = imaged.row_of(name), after = predicted.row_of(name);
     registration::Landmark shared{name, measured.points.row(static_cast<Eigen::Index>(l)), {}, Eigen::Vector3d::Zero()};
     if (measured.sigma_mm.size() > 0)
       shared.sigma_mm = measured.sigma_mm[static_cast<Eigen::Index>(l)];
     else
       shared.sigma_mm = usual_sigma_mm;
     shared.rigid = std::find(rigid.begin(), rigid.end(), name) != rigid.end();
-    if (shared.rigid && before >= 0) {
-      shared.image = imaged.points.row(before);
-    } else if (!shared.rigid && after >= 0 && before >= 0) {
-      shared.image = predicted.points.row(after);
-      shared.displacement = predicted.points.row(after) - imaged.points.row(before);
+    if (shared.rigid && before) {
+      shared.image = imaged.points.row(*before);
+    } else if (!shared.rigid && after && before) {
+      shared.image = predicted.points.row(*after);
+      shared.displacement = predicted.points.row(*after) - imaged.points.row(*before);
     } else {
       continue;
     }

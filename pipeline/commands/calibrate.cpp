@@ -272,10 +272,9 @@ class CalibrateTool : public Tool {
     result.held_out_blocks = calibration::figures_of(as_list(calibration::held_out_distances(
         residuals, fit.linearisation.slope, priors, calibration::spatial_blocks(residuals))));
     if (measured_->held_out.empty()) return;
-    calibration::MeasuredScene scene = measured_->whole_scene();
-    scene.measurements.erase(scene.measurements.begin(),
-                             scene.measurements.begin() + static_cast<std::ptrdiff_t>(measured_->fitted.size()));
-    scene.landmarks.clear();
+    calibration::MeasuredScene scene = measured_->fitted_scene();
+    scene.measurements.clear();
+    for (const calibration::Measurement& held_out : measured_->held_out) scene.measurements.push_back(&held_out);
     const simulation::Model model = parameters.model(result.fit.u);
     Evaluator other(scene, model);
     simulation::ChainSolution near = result.fit.prediction.solution;

@@ -99,11 +99,7 @@ const Eigen::VectorXd& PolyData::array(const std::string& name, const fs::path& 
 
 PolyData read_polydata(const fs::path& file) {
   if (!fs::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
-  check_survivable(file, [&file] {
-    vtkNew<vtkXMLPolyDataReader> trial;
-    trial->SetFileName(file.c_str());
-    trial->Update();
-  });
+  check_survivable_by<vtkXMLPolyDataReader>(file);
   vtkNew<vtkXMLPolyDataReader> reader;
   if (reader->CanReadFile(file.c_str()) == 0)
     throw InputError(fmt::format("{}: not a VTK polydata file (.vtp); write it again with its tool", file.string()));

@@ -65,11 +65,7 @@ class ErrorCollector {
 };
 
 void update(vtkXMLImageDataReader& reader, const std::filesystem::path& file) {
-  check_survivable(file, [&file] {
-    vtkNew<vtkXMLImageDataReader> trial;
-    trial->SetFileName(file.c_str());
-    trial->Update();
-  });
+  check_survivable_by<vtkXMLImageDataReader>(file);
   ErrorCollector errors(reader);
   reader.SetReaderErrorObserver(errors.command());
   reader.SetParserErrorObserver(errors.command());

@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <random>
 
 #include "common/error.h"
 #include "common/statistics.h"
@@ -175,6 +176,26 @@ TEST(ScoreTest, PowerIsTheShareOfScansThatScoreAboveChance) {
   EXPECT_GT(power, 0.5);
   EXPECT_LT(power, 0.95);
   EXPECT_NEAR(found / static_cast<double>(trials), power, 4 * std::sqrt(power * (1 - power) / trials));
+}
+
+TEST(ScoreTest, FactorToBeExpectedIsTheMeanOverScansThatHaveTheEffect) {
+  // ln of the density of the score under a normal prior of the effect's size over that without it.
+  Residuals r = sheet(5, 200);
+  auto candidates = catalogue_of(r);
+  const Eigen::VectorXd& wave = candidates[0].slope;
+  candidates[0].secant = 2.5 * 0.5 / wave.norm() * wave;  // 0.5 mm of noise
+  const ScoreTable table = score_candidates(r, no_mean(r), fitted_slopes(r), candidates, Whitening::independent(r), 1);
+  const double lambda = score_of(table, "wave").noncentrality;
+  EXPECT_GT(lambda, 2);
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal(std::sqrt(lambda), 1);
+  double sum = 0;
+  constexpr int draws = 200000;
+  for (int k = 0; k < draws; ++k) {
+    const double z = normal(generator), wide = 1 + lambda;
+    sum += 0.5 * (z * z - z * z / wide - std::log(wide));
+  }
+  EXPECT_NEAR(score_of(table, "wave").expected_ln_factor, sum / draws, 0.02);
 }
 
 TEST(ScoreTest, ChiSquaredTailsAreThoseOfTheTables) {

@@ -112,6 +112,19 @@ std::pair<double, double> found_in(const calibration::MeasuredScene& scene, cons
           evidence.directions().unit[of] * sd};
 }
 
+TEST(LandmarkRows, ErrByWhatTheirFilesSayAndNoMore) {
+  const Marked marked(0.5);
+  const simulation::Model truth = supine::testing::twin_truth();
+  calibration::Evaluator evaluator(marked.scene(), truth, accurate_enough());
+  BaseFitOptions options;
+  options.other_meshes = false;
+  options.priors.patchiness = {.tissue = 0, .skin = 0, .muscle_mm = 0};
+  const BaseFit base = fit_base_model(evaluator, truth, truth, {0.3}, nullptr, options);
+  const Eigen::Index count = base.errors.rows();
+  EXPECT_LT((base.errors.bottomRightCorner(9, 9) - 0.25 * Eigen::MatrixXd::Identity(9, 9)).norm(), 1e-12);
+  EXPECT_EQ(base.errors.bottomLeftCorner(9, count - 9).norm(), 0) << "no error of the scanner is in them";
+}
+
 TEST(JointPosterior, HoldsTheTruthOfATwin) {
   const Marked marked(0.5);
   const simulation::Model start = supine::testing::twin_start();
