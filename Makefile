@@ -3,7 +3,9 @@
 #   make demo                        install what is missing, build, take the sample from its MRI to the report
 #   make test [DATA=dir]             the same set-up, then every test; DATA: docs/data.md
 #   make CASE=dir [OUT=dir] [stage]  run a case: segment reconstruct decimate mesh simulate compare, or as far as its data allow;
-#                                    then calibrate, diagnose, ladder; report: one page of what is there
+#                                    then calibrate, diagnose, ladder, sensitivity; report: one page of what is there
+#   make COHORT=dir [TARGET=stage] [OUT=dir] [PROFILE=cohort/slurm]
+#                                    the same for every case in the folder; with PROFILE through Snakemake: cohort/README.md
 #   make style                       whether every source file is as clang-format 14 writes it; make format writes it
 #   make build                       only build, into $(BUILD); make tools: without tests and measurements
 #   make bench [DATA=dir]            every measurement of docs/verification.md and docs/performance.md: hours, on a quiet machine
@@ -19,19 +21,28 @@ DEVELOPER ?= OFF
 # One compiler per core, as far as 1.5 GB of free memory for each allow: heavy templates.
 JOBS ?= $(shell awk -v cores=$$(nproc) '/^MemAvailable/ { m = int($$2 / 1572864); n = m < cores ? m : cores; print n < 1 ? 1 : n }' /proc/meminfo)
 
-stages := segment reconstruct decimate mesh simulate register compare calibrate diagnose ladder report summary
+stages := segment reconstruct decimate mesh simulate register compare calibrate diagnose ladder sensitivity draws report summary
 run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 
 # Data that the repository does not hold: docs/data.md.
 DATA ?= data
 
-.PHONY: style format bench study hidden demo test build tools configure setup clean help case $(stages)
+.PHONY: style format bench study hidden demo test build tools configure setup clean help case cohort $(stages)
 
 ifdef CASE
 case: tools
 	$(run_case)
 $(stages): tools
 	$(run_case) $@
+else ifdef COHORT
+cohort: tools
+ifdef PROFILE
+	@command -v snakemake >/dev/null || { echo "PROFILE=$(PROFILE) needs Snakemake: apt-get install snakemake" >&2; exit 2; }
+	@snakemake -s cohort/Snakefile --profile $(PROFILE) --config cohort=$(COHORT) $(if $(TARGET),target=$(TARGET)) $(if $(OUT),out=$(OUT)) bin=$(BUILD)/bin \
+	  $(if $(MAKE_CASE),make="$(MAKE_CASE)")
+else
+	+@$(MAKE) --no-print-directory -f cohort/Makefile BIN=$(BUILD)/bin
+endif
 else
 help:
 	@sed -n '3,/^$$/s/^#//p' Makefile

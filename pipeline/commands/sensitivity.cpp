@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
@@ -11,6 +12,7 @@
 #include "pipeline/case/journal_key.h"
 #include "pipeline/case/measured_case.h"
 #include "pipeline/picture/picture.h"
+#include "pipeline/results/sensitivity_table.h"
 
 namespace supine::pipeline {
 namespace {
@@ -31,10 +33,13 @@ class SensitivityTool : public Tool {
     return "Draws the free parameters from what the model believes of them (value, prior_sd) and runs the chain for "
            "each draw: how much does the error depend on them, and on which?\n"
            "Writes sensitivity.csv (a row per draw) and sensitivity.json. -o names the CSV file or its folder "
-           "(default: the folder of the mesh). Interrupted, it goes on where it was.\n\n"
+           "(default: the folder of the mesh). Interrupted, it goes on where it was. Draws may be run in parts, "
+           "anywhere, and merged to the same bytes.\n\n"
            "Examples:\n"
            "  supine-sensitivity mycase mycase/out/mesh.vtu --samples 1000\n"
-           "  supine-sensitivity mycase mycase/out/mesh.vtu --law normal --seed 7 -o normal.csv\n";
+           "  supine-sensitivity mycase mycase/out/mesh.vtu --law normal --seed 7 -o normal.csv\n"
+           "  supine-sensitivity mycase mycase/out/mesh.vtu --draws 250:500 -o parts/250-500.csv\n"
+           "  supine-sensitivity mycase mycase/out/mesh.vtu --samples 500 --merge parts/0-250.csv parts/250-500.csv\n";
   }
 
   void declare(CLI::App& app) override {
@@ -48,6 +53,12 @@ class SensitivityTool : public Tool {
         ->check(CLI::IsMember({"prior", "normal"}))
         ->capture_default_str();
     app.add_option("--seed", seed_, "of the draws")->capture_default_str();
+    auto* merge = app.add_option("--merge", parts_,
+                                 "no runs: put together what --draws wrote; every draw of --samples must be there");
+    auto* part = app.add_option("--draws", draws_,
+                                "A:B, only the draws from A on up to but without B, counted from 0; no statistics")
+                     ->excludes(merge);
+    part->excludes(app.get_option("--samples"));
     declare_png(app, png_, "a histogram of the error with its quantiles");
   }
 
@@ -55,31 +66,47 @@ class SensitivityTool : public Tool {
     run.stage("read");
     const fs::path target = target_file();
     run.output(target);  // before the work, so that nobody waits for what cannot be written
-    announce_png(run, png_, target);
+    if (draws_.empty()) announce_png(run, png_, target);
+    const DrawRange range =
+        draws_.empty() ? DrawRange{0, static_cast<std::size_t>(samples_)} : parse_draw_range(draws_);
+    if (range.end > most_samples) throw InputError(fmt::format("--draws {}: at most {} draws", draws_, most_samples));
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
     const FreeParameters parameters(measured_->model);
     const DrawKind kind = law_ == "normal" ? DrawKind::normal : DrawKind::prior;
-    const calibration::Draws draws = calibration::draw_parameters(parameters, kind, samples_, seed_);
+    const auto draws = calibration::draw_parameters(parameters, kind, static_cast<int>(range.end), seed_);
     if (draws.refused > 0)
       run.warn(
           fmt::format("{} of {} draws lay outside the range of a parameter (with the normal law mostly negative "
                       "moduli) and were refused; the sample is that of the law cut at the ranges",
-                      draws.refused, samples_ + draws.refused));
+                      draws.refused, range.end + static_cast<std::size_t>(draws.refused)));
     run.stage("runs");
-    const std::vector<RunResult> results = simulate(run, parameters, draws, target);
+    const SensitivityRows rows =
+        parts_.empty() ? simulate(run, parameters, draws, range, target) : merge(parameters, draws);
     run.stage("write");
-    write(run, target, parameters, draws, results);
+    std::ofstream stream(run.output(target), std::ios::binary);
+    write_sensitivity(rows, parameters.names(), stream);
+    if (draws_.empty())
+      report(run, target, parameters, draws, rows);
+    else
+      report_part(run, target, rows);
     return Outcome::done;
   }
 
  private:
+  static constexpr std::size_t most_samples = 1000000;
+
   fs::path target_file() const {
     if (output.extension() == ".csv") return output;
     return (output.empty() ? mesh_file_.parent_path() : output) / "sensitivity.csv";
   }
 
-  std::vector<RunResult> simulate(Run& run, const FreeParameters& parameters, const calibration::Draws& draws,
-                                  const fs::path& target) const {
+  /// What every run depends on besides its own numbers: parts of another are not merged.
+  std::string depends_on() const { return journal_key(*measured_, case_folder_, mesh_file_); }
+
+  SensitivityRows simulate(Run& run, const FreeParameters& parameters, const calibration::Draws& draws,
+                           const DrawRange& range, const fs::path& target) const {
+    SensitivityRows rows{
+        range, {draws.values.begin() + static_cast<std::ptrdiff_t>(range.first), draws.values.end()}, {}};
     calibration::RunJournal journal(fs::path(target).replace_extension(".runs"),
                                     journal_key(*measured_, case_folder_, mesh_file_));
     if (journal.known() > 0) run.say(fmt::format("  going on after {} chain runs", journal.known()));
@@ -87,43 +114,45 @@ class SensitivityTool : public Tool {
     LiveProgress live(run);
     std::size_t finished = journal.known();
     int failed = 0;
-    const auto results = pool.run(draws.values, journal, [&](const RunResult& result) {
+    rows.results = pool.run(rows.values, journal, [&](const RunResult& result) {
       failed += result.failed;
-      live.show(fmt::format("run {} of {}, {} without equilibrium", ++finished, draws.values.size(), failed));
+      live.show(fmt::format("run {} of {}, {} without equilibrium", ++finished, range.count(), failed));
     });
     run.no_longer_needed(journal.file());
-    return results;
+    return rows;
   }
 
-  void write(Run& run, const fs::path& target, const FreeParameters& parameters, const calibration::Draws& draws,
-             const std::vector<RunResult>& results) const {
-    std::ofstream stream(run.output(target), std::ios::binary);
-    stream << "sample";
-    for (const std::string& name : parameters.names()) stream << "," << name;
-    stream << ",mae_study_mm,mae_mm,rms_mm,failed\n";
-    std::vector<double> mae;
-    std::vector<Eigen::Index> rows;
-    for (std::size_t i = 0; i < results.size(); ++i) {
-      const RunResult& r = results[i];
-      stream << i + 1;
-      for (const double value : draws.values[i]) stream << "," << fmt::format("{}", value);
-      if (r.failed) {
-        stream << ",,,,1\n";
-        continue;
-      }
-      stream << fmt::format(",{},{},{},0\n", r.mae_study_mm, r.mae_mm, r.rms_mm);
-      mae.push_back(r.mae_study_mm);
-      rows.push_back(static_cast<Eigen::Index>(i));
+  SensitivityRows merge(const FreeParameters& parameters, const calibration::Draws& draws) const {
+    std::vector<std::pair<fs::path, SensitivityRows>> parts;
+    for (const fs::path& file : parts_) {
+      parts.emplace_back(file, read_sensitivity(file, parameters.names()));
+      const fs::path sidecar = fs::path(file).replace_extension(".json");
+      std::ifstream stream(sidecar);
+      const Json said = Json::parse(stream, nullptr, false);
+      if (said.is_discarded() || said.value("depends_on", "") != depends_on())
+        throw InputError(fmt::format(
+            "{}: the part was not made by this program from this case, model, mesh and scans; make it again with "
+            "--draws {}:{}",
+            sidecar.string(), parts.back().second.range.first, parts.back().second.range.end));
     }
-    if (!stream.flush()) throw InputError("writing sensitivity.csv failed; check the free space on the disk");
-    Eigen::MatrixXd values(rows.size(), parameters.size());
-    for (std::size_t i = 0; i < rows.size(); ++i)
-      values.row(static_cast<Eigen::Index>(i)) = draws.values[static_cast<std::size_t>(rows[i])].transpose();
-    report(run, target, parameters, draws, values, mae);
+    return merge_sensitivity(std::move(parts), draws.values);
+  }
+
+  void report_part(Run& run, const fs::path& target, const SensitivityRows& rows) const {
+    const auto failed =
+        std::count_if(rows.results.begin(), rows.results.end(), [](const RunResult& r) { return r.failed; });
+    Json& f = run.figures(target);
+    f["draws"] = {rows.range.first, rows.range.end};
+    f["law"] = law_;
+    f["failed_solves"] = failed;
+    f["depends_on"] = depends_on();
+    run.say(fmt::format("  draws {} to {}: {} chain runs, {} without equilibrium", rows.range.first, rows.range.end - 1,
+                        rows.range.count(), failed));
   }
 
   void report(Run& run, const fs::path& target, const FreeParameters& parameters, const calibration::Draws& draws,
-              const Eigen::MatrixXd& values, const std::vector<double>& mae) const {
+              const SensitivityRows& rows) const {
+    const auto& [values, mae] = solved_draws(rows, parameters.size());
     const int failed = samples_ - static_cast<int>(mae.size());
     if (mae.size() < 2)
       throw NumericalFailure(
@@ -169,6 +198,8 @@ class SensitivityTool : public Tool {
   }
 
   fs::path case_folder_, mesh_file_, model_file_, png_;
+  std::vector<fs::path> parts_;
+  std::string draws_;
   int samples_ = 1000;
   std::string law_ = "prior";
   unsigned seed_ = 1;

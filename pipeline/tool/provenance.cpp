@@ -77,7 +77,7 @@ Json resolved_options(const CLI::App& app) {
 }
 
 Json reproducible_options(const Json& options) {
-  constexpr std::array<std::string_view, 5> harmless = {"output", "threads", "json", "force", "quiet"};
+  constexpr std::array<std::string_view, 6> harmless = {"output", "threads", "json", "force", "quiet", "merge"};
   Json kept = Json::object();
   for (const auto& [name, value] : options.items()) {
     if (std::find(harmless.begin(), harmless.end(), name) != harmless.end()) continue;

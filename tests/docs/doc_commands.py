@@ -28,6 +28,7 @@ DEAR = {
     "make bench": "hours",
     "make study": "an hour or more",
     "make hidden": "half an hour or more",
+    "make COHORT=": "names for the reader to replace; tests/cohort runs a cohort",
     "make CASE=path/to/case": "a name for the reader to replace; the same targets are run on a sample",
     "CASE_OUT=": "ParaView cannot be installed beside libvtk9-dev; tests/docs/paraview_arrays.py checks what the script opens",
     "git clone": "fetches the source",
@@ -103,7 +104,7 @@ def check_tool(command, bin_folder):
 def check_make(command, source):
     if not re.search(r"(?:^|&& )make\b", command):
         return None
-    texts = (source / "Makefile").read_text() + (source / "pipeline" / "Makefile").read_text()
+    texts = (source / "Makefile").read_text() + (source / "pipeline" / "Makefile").read_text() + (source / "cohort" / "Makefile").read_text()
     words = shlex.split(re.search(r"(?:^|&& )make\b([^&]*)", without_comment(command)).group(1).replace("[", "").replace("]", ""))
     skip = False
     for word in words:

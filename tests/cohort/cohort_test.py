@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: AGPL-3.0-or-later
+"""Cohorts of the small case: cohort_test.py SOURCE BIN SMALL_RUN. Through make, and through Snakemake where there is one."""
+
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE, BIN, SMALL = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+SETTINGS = "TRIANGLES=800 MAX_DISTANCE_MM=3 SAMPLES=5"
+
+
+def run(command):
+    clean = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
+    return subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          cwd=SOURCE, env=clean)
+
+
+def make_cohort(cohort, *settings):
+    return run(["make", "--no-print-directory", "-f", "cohort/Makefile", f"COHORT={cohort}", f"BIN={BIN}", "THREADS=1", *settings])
+
+
+def snakemake(cohort, out, folder, *settings):
+    return run(["snakemake", "-q", "-s", "cohort/Snakefile", "-c", "1", "-k", "--directory", folder, "--config", f"cohort={cohort}",
+                f"out={out}", f"bin={BIN}", *settings])
+
+
+def figures(file):
+    whole = json.loads(file.read_text())
+    whole.pop("timing")
+    return whole
+
+
+class Cohort(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.work = pathlib.Path(self.folder.name)
+        self.cohort = self.work / "cohort"
+        for name in ("anna", "berta", "clara"):
+            self.add(name)
+
+    def add(self, name):
+        case = self.cohort / name
+        shutil.copytree(SMALL, case, ignore=shutil.ignore_patterns("out"))
+        text = (case / "case.toml").read_text()
+        (case / "case.toml").write_text(text.replace('name = "small"', f'name = "{name}"'))
+        self.assertIn(f'name = "{name}"', (case / "case.toml").read_text())
+        return case
+
+    def break_case(self, name):
+        model = self.cohort / name / "model.toml"
+        model.write_text(model.read_text().replace("[skin]", "[skim]"))
+
+    def test_make_sets_a_failed_case_aside_and_runs_nothing_twice(self):
+        self.break_case("berta")
+        first = make_cohort(self.cohort, "TARGET=sensitivity", *SETTINGS.split())
+        self.assertIn("2 of 3 cases done, 1 set aside", first.stdout)
+        self.assertIn("skim", first.stdout)
+        self.assertNotEqual(first.returncode, 0)
+        table = self.cohort / "anna/out/sensitivity.csv"
+        self.assertEqual(len(table.read_text().splitlines()), 6)
+        before = table.stat().st_mtime_ns
+        model = self.cohort / "berta/model.toml"
+        model.write_text(model.read_text().replace("[skim]", "[skin]"))
+        second = make_cohort(self.cohort, "TARGET=sensitivity", *SETTINGS.split())
+        self.assertEqual(second.returncode, 0, second.stdout)
+        self.assertIn("3 of 3 cases done", second.stdout)
+        self.assertFalse((self.cohort / "berta/out/failed.txt").exists())
+        self.assertEqual(table.stat().st_mtime_ns, before)
+
+    @unittest.skipUnless(shutil.which("snakemake"), "no snakemake")
+    def test_snakemake_in_parts_gives_the_bytes_of_make(self):
+        shutil.rmtree(self.cohort / "clara")
+        self.break_case("berta")
+        make_cohort(self.cohort, "TARGET=sensitivity", *SETTINGS.split())
+        said = snakemake(self.cohort, self.work / "out", self.work, "target=sensitivity", f"make={SETTINGS} PARTS=2")
+        self.assertIn("1 of 2 cases done, 1 set aside", said.stdout)
+        alone, here = self.cohort / "anna/out", self.work / "out/anna"
+        for file in ("labels.vti", "mesh.vtu", "sensitivity.csv"):
+            self.assertEqual((alone / file).read_bytes(), (here / file).read_bytes(), file)
+        self.assertEqual(figures(alone / "sensitivity.json"), figures(here / "sensitivity.json"))
+        self.assertTrue((here / "draws/0-2.csv").exists() and (here / "draws/2-5.csv").exists())
+        self.assertIn("skim", (self.work / "out/berta/failed.txt").read_text())
+        self.parts_that_do_not_fit_are_refused(here)
+
+    def parts_that_do_not_fit_are_refused(self, out):
+        merge = [BIN / "supine-sensitivity", self.cohort / "anna", out / "mesh.vtu", "--threads", "1", "-o", self.work / "merged.csv"]
+        first, second = out / "draws/0-2.csv", out / "draws/2-5.csv"
+        for words, message in (
+            (["--samples", "5", "--merge", second], "draw 0 is in no part, of 5 that --samples asks for; make it with --draws 0:2"),
+            (["--samples", "5", "--merge", first, first, second], "draw 0 is in another part too"),
+            (["--samples", "4", "--merge", first, second], "holds draws up to 5 and --samples asks for 4"),
+            (["--samples", "5", "--seed", "2", "--merge", first, second], "sample 1 is not what --seed and --law draw"),
+            (["--draws", "7:7"], "--draws 7:7: must be A:B"),
+        ):
+            said = run([*merge, *words])
+            self.assertEqual(said.returncode, 2, said.stdout)
+            self.assertIn(message, said.stdout)
+        self.assertFalse((self.work / "merged.csv").exists())
+
+    def refused(self, *words):
+        said = make_cohort(self.cohort, "TARGET=mesh")
+        self.assertNotEqual(said.returncode, 0)
+        for word in words:
+            self.assertIn(word, said.stdout)
+        self.assertEqual(said.stdout.count("error:"), 1, said.stdout)
+        self.assertFalse(list(self.cohort.glob("*/out")), "something was run")
+
+    def test_a_cohort_without_cases_is_refused(self):
+        shutil.rmtree(self.cohort)
+        self.cohort.mkdir()
+        self.refused("holds no case")
+
+    def test_two_cases_of_one_name_are_refused(self):
+        case = self.cohort / "clara/case.toml"
+        case.write_text(case.read_text().replace('"clara"', '"anna"'))
+        self.refused("anna", "clara", 'both named "anna"')
+
+    def test_a_case_that_is_a_link_to_outside_is_refused(self):
+        shutil.move(self.cohort / "clara", self.work / "elsewhere")
+        (self.cohort / "clara").symlink_to(self.work / "elsewhere")
+        self.refused("clara", "outside the cohort")
+
+    def test_a_file_that_lies_outside_is_refused(self):
+        shutil.move(self.cohort / "clara/supine.ply", self.work / "supine.ply")
+        (self.cohort / "clara/supine.ply").symlink_to(self.work / "supine.ply")
+        self.refused("clara", "surface.supine", "outside the cohort")
+
+    def test_a_name_that_make_cannot_handle_is_refused(self):
+        (self.cohort / "clara").rename(self.cohort / "clara two")
+        self.refused("clara two", "cannot handle")
+
+    @unittest.skipUnless(shutil.which("snakemake"), "no snakemake")
+    def test_a_cluster_that_does_not_answer_is_refused_before_anything_is_submitted(self):
+        said = run(["snakemake", "-s", "cohort/Snakefile", "--profile", SOURCE / "cohort/slurm", "--directory", self.work, "--config",
+                    f"cohort={self.cohort}", f"out={self.work / 'out'}", f"bin={BIN}"])
+        self.assertNotEqual(said.returncode, 0)
+        self.assertIn("does not answer, nothing was submitted", said.stdout)
+        self.assertFalse((self.work / "out").exists())
+
+
+class StagesOnTheWay(unittest.TestCase):
+    def test_after_the_stages_on_the_way_make_has_only_the_target_left(self):
+        with tempfile.TemporaryDirectory() as folder:
+            case = pathlib.Path(folder) / "case"
+            shutil.copytree(SMALL, case, ignore=shutil.ignore_patterns("out"))
+            make = ["make", "-s", "-f", "pipeline/Makefile", f"CASE={case}", f"BIN={BIN}", "THREADS=1", *SETTINGS.split()]
+            way = run([*make, "TARGET=compare", "way"]).stdout.split()
+            self.assertEqual(way[-1], "compare")
+            for stage in way:
+                said = run([*make, stage]).stdout
+                self.assertEqual(said.count("== "), 1, f"{stage} is not one step after those before it:\n{said}")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
