@@ -3,11 +3,12 @@
 #   make demo                        install what is missing, build, take the sample from its MRI to the report
 #   make test [DATA=dir]             the same set-up, then every test; DATA: docs/data.md
 #   make CASE=dir [OUT=dir] [stage]  run a case: segment reconstruct decimate mesh simulate compare, or as far as its data allow;
-#                                    then calibrate, diagnose, ladder, sensitivity; report: one page of what is there
+#                                    then calibrate, diagnose, ladder, sensitivity, warp; report: one page of what is there
 #   make COHORT=dir [TARGET=stage] [OUT=dir] [PROFILE=cohort/slurm]
 #                                    the same for every case in the folder; with PROFILE through Snakemake: cohort/README.md
 #   make style                       whether every source file is as clang-format 14 writes it; make format writes it
 #   make build                       only build, into $(BUILD); make tools: without tests and measurements
+#   make package                     Debian packages in $(BUILD)/package; make package-test installs and tries them in a bare Debian 12
 #   make bench [DATA=dir]            every measurement of docs/verification.md and docs/performance.md: hours, on a quiet machine
 #   make study [DATA=dir]            every table of docs/study.md: an hour or more, on a quiet machine
 #   make hidden [N=60] [SEED=1]      N cases with a sealed answer, each diagnosed from its folder alone; confusion matrix
@@ -21,13 +22,13 @@ DEVELOPER ?= OFF
 # One compiler per core, as far as 1.5 GB of free memory for each allow: heavy templates.
 JOBS ?= $(shell awk -v cores=$$(nproc) '/^MemAvailable/ { m = int($$2 / 1572864); n = m < cores ? m : cores; print n < 1 ? 1 : n }' /proc/meminfo)
 
-stages := segment reconstruct decimate mesh simulate register compare calibrate diagnose ladder sensitivity draws report summary
+stages := segment reconstruct decimate mesh simulate register compare calibrate diagnose ladder sensitivity draws warp report summary
 run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 
 # Data that the repository does not hold: docs/data.md.
 DATA ?= data
 
-.PHONY: style format bench study hidden demo test build tools configure setup clean help case cohort $(stages)
+.PHONY: style format bench study hidden demo test build tools package package-test configure setup clean help case cohort $(stages)
 
 ifdef CASE
 case: tools
@@ -71,6 +72,15 @@ demo: tools
 	@echo
 	@echo "Open samples/ligament/out/report.html in a browser. To see the error fall on the body as what is missing is added:"
 	@echo "  make CASE=samples/ligament ladder report"
+
+package: tools
+	@cmake --build $(BUILD) --target man_pages
+	@cd $(BUILD) && cpack -G DEB --config CPackConfig.cmake -B package
+	@rm -rf $(BUILD)/package/_CPack_Packages && ls -lh $(BUILD)/package/*.deb
+
+# Needs root, debootstrap and Debian's registry: not part of make test.
+package-test: package
+	@tests/package/package_test.sh $(BUILD)/package $(BUILD)/package-test
 
 test: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel 2

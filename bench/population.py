@@ -3,10 +3,11 @@
 """Breasts that move as far as volunteers' do: how each chain ends, and how far the population moves.
 
     bench/population.py WORK [--cases N] [--seed N] [--bin build/bin] [--jobs 2] [--rings 11] [--order 2]
-                        [--triangles 2500] [--chain-order 1] [--slow [--successes 40]] [--table]
+                        [--triangles 2500] [--chain-order 1] [--rows FILE] [--slow [--successes 40]] [--table]
 
 Draws cases (supine-phantom --population volunteers), meshes them and runs supine-simulate at the true moduli. A row of
-WORK/rows.jsonl is written as soon as a chain has ended; a call goes on from the rows that are there. --slow runs every
+WORK/rows.jsonl (--rows) is written as soon as a chain has ended; a call goes on from the rows that are there, so that
+the file alone takes a run to another machine. --slow runs every
 failure and 40 certified chains (--successes) again, on a finer mesh and in small load steps, into WORK/slow.jsonl.
 The tables are Markdown; --table prints them from the rows and runs nothing. Standard library only.
 """
@@ -140,6 +141,8 @@ def one_case(options, seed):
     row = {"seed": seed} | {key: answer[key] for key in ("base", "geometry", "volume_ml", "gave_way", "motion")}
     row |= chain(options, name, options.triangles, "out")
     row["commit"] = answer["provenance"]["commit"]
+    row["chain"] = {"order": options.chain_order, "triangles": options.triangles}
+    row["truth"] = {"order": options.order, "rings": options.rings, "voxel_mm": options.voxel_mm}
     return row
 
 
@@ -265,6 +268,7 @@ def arguments():
     parser.add_argument("--limit-s", type=float, default=1800, help="of every program, wall clock")
     parser.add_argument("--slow", action="store_true", help="failures and successes again, finer and in small steps")
     parser.add_argument("--successes", type=int, default=40, help="how many of them --slow runs")
+    parser.add_argument("--rows", type=pathlib.Path, help="default WORK/rows.jsonl")
     parser.add_argument("--table", action="store_true", help="only print the tables")
     options = parser.parse_args()
     options.work, options.bin = options.work.resolve(), options.bin.resolve()
@@ -275,7 +279,7 @@ def main():
     options = arguments()
     for folder in ("cases", "answers", "out", "logs"):
         (options.work / folder).mkdir(parents=True, exist_ok=True)
-    file, slow_file = options.work / "rows.jsonl", options.work / "slow.jsonl"
+    file, slow_file = options.rows or options.work / "rows.jsonl", options.work / "slow.jsonl"
     if not options.table:
         known = {row["seed"] for row in read_rows(file)}
         wanted = range(options.seed, options.seed + options.cases)

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "calibration/bounded_descent.h"
 
-#include <ceres/iteration_callback.h>
-#include <ceres/problem.h>
-#include <ceres/solver.h>
+#include <fmt/format.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
 #include "calibration/chain_cost.h"
@@ -19,172 +16,190 @@ namespace {
 using State = ChainCost::State;
 
 constexpr double settled_sd = 0.05, rough_sd = 0.1;
+// Half the trust region, in ln(value); coordinates that are no logarithm have the scale of a prior or a typical size.
+constexpr double largest_radius = 1.5, linear_share = 4;
+constexpr double poor_ratio = 0.25, good_ratio = 0.75;  // of what the cost fell to what the step promised
+constexpr double after_poor = 0.5, after_failure = 0.25, after_good = 2;
+constexpr double least_ratio = 1e-4;    // a step that brings less is not taken
+constexpr double shortest_step = 1e-3;  // distances have kinks: there the cost falls along no step
+constexpr double shortest_failure = 0.01;
+constexpr double least_curvature = 1e-12;  // share of the largest: what moves nothing has a step all the same
 
-/// Which coordinates do not move, and why.
-class ActiveSet {
- public:
-  ActiveSet(const FreeParameters& parameters, const std::vector<bool>& held)
-      : parameters_(parameters), held_(held), at_bound_(static_cast<std::size_t>(parameters.size()), false) {
-    held_.resize(at_bound_.size(), false);
-  }
-
-  bool moves(Eigen::Index i) const {
-    return !held_[static_cast<std::size_t>(i)] && !at_bound_[static_cast<std::size_t>(i)];
-  }
-
-  std::vector<int> moving() const {
-    std::vector<int> list;
-    for (int i = 0; i < parameters_.size(); ++i)
-      if (moves(i)) list.push_back(i);
-    return list;
-  }
-
-  /// Takes in what has come to sit at its bound. @return whether anything has
-  bool take_in(const State& state) {
-    bool changed = false;
-    for (Eigen::Index i = 0; i < parameters_.size(); ++i)
-      if (moves(i) && pushes_out(state, i)) changed = at_bound_[static_cast<std::size_t>(i)] = true;
-    return changed;
-  }
-
-  /// Lets go what would now gain inside its range. @return whether anything has been let go
-  bool let_go(const State& state, double worth) {
-    bool changed = false;
-    for (Eigen::Index i = 0; i < parameters_.size(); ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      const double gain = state.gradient[i] * state.gradient[i] / state.information(i, i);
-      if (!at_bound_[k] || pushes_out(state, i) || !(gain > worth)) continue;
-      at_bound_[k] = false;
-      changed = true;
-    }
-    return changed;
-  }
-
- private:
-  bool pushes_out(const State& state, Eigen::Index i) const {
-    return (state.u[i] <= parameters_.lower()[i] && state.gradient[i] >= 0) ||
-           (state.u[i] >= parameters_.upper()[i] && state.gradient[i] <= 0);
-  }
-
-  const FreeParameters& parameters_;
-  std::vector<bool> held_, at_bound_;
+/// Where steps may end.
+struct Box {
+  Eigen::VectorXd lower, upper;
 };
 
-/// Square of the Gauss-Newton step in standard deviations, over the coordinates that move.
-double squared_step_sd(const State& state, const std::vector<int>& moving) {
-  if (moving.empty()) return 0;
-  const Eigen::VectorXd gradient = state.gradient(moving);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(state.information(moving, moving));
-  const Eigen::VectorXd along = eigen.eigenvectors().transpose() * gradient;
-  // Directions that move nothing, up to rounding, have nothing to gain.
-  const double least = 1e-12 * eigen.eigenvalues().maxCoeff();
-  double squared = 0;
-  for (Eigen::Index i = 0; i < along.size(); ++i)
-    if (eigen.eigenvalues()[i] > least) squared += along[i] * along[i] / eigen.eigenvalues()[i];
-  return squared;
+/// The range of the parameters around @p u; held ones stay.
+Box range_around(const FreeParameters& parameters, const std::vector<bool>& held, const Eigen::VectorXd& u) {
+  Box box{parameters.lower() - u, parameters.upper() - u};
+  for (std::size_t i = 0; i < held.size(); ++i)
+    if (held[i]) box.lower[static_cast<Eigen::Index>(i)] = box.upper[static_cast<Eigen::Index>(i)] = 0;
+  box.lower = box.lower.cwiseMin(0);
+  box.upper = box.upper.cwiseMax(0);
+  return box;
 }
 
-/// Ends Ceres' iterations when they have settled, or when a coordinate has come to its bound.
-class Watch : public ceres::IterationCallback {
+Eigen::VectorXd reaches(const FreeParameters& parameters) {
+  Eigen::VectorXd reach(parameters.size());
+  for (Eigen::Index i = 0; i < reach.size(); ++i) reach[i] = parameters.is_log(i) ? 1 : linear_share;
+  return reach;
+}
+
+/// What a step takes off the cost if residuals change along their slopes.
+double promise(const State& state, const Eigen::VectorXd& step) {
+  return -(state.gradient.dot(step) + 0.5 * step.dot(state.information * step));
+}
+
+/// The fall of the cost that is worth a chain run.
+double worth(const State& state, double step_sd) {
+  const double mean_square = 2 * state.cost / static_cast<double>(state.rows);
+  return 0.5 * step_sd * step_sd * std::max(1.0, mean_square);
+}
+
+/// @p u moved by the step; on the end of its range exactly where the step leads there.
+Eigen::VectorXd moved(const FreeParameters& parameters, const Eigen::VectorXd& u, const Eigen::VectorXd& step,
+                      const Box& range) {
+  Eigen::VectorXd to = u + step;
+  for (Eigen::Index i = 0; i < to.size(); ++i) {
+    if (step[i] != 0 && step[i] <= range.lower[i]) to[i] = parameters.lower()[i];
+    if (step[i] != 0 && step[i] >= range.upper[i]) to[i] = parameters.upper()[i];
+  }
+  return parameters.clamped(to);
+}
+
+std::string values_of(const FreeParameters& parameters, const Eigen::VectorXd& u) {
+  std::string text;
+  for (Eigen::Index i = 0; i < u.size(); ++i)
+    text += fmt::format("{}{} = {:.3g} {}", i > 0 ? ", " : "", parameters.names()[static_cast<std::size_t>(i)],
+                        parameters.value(i, u[i]), parameters.unit(i));
+  return text;
+}
+
+/// The trust region: half its width, and what the last step says of it.
+class TrustRegion {
  public:
-  Watch(const ChainCost& cost, ActiveSet& active, double step_sd) : cost_(cost), active_(active), step_sd_(step_sd) {}
+  explicit TrustRegion(const FreeParameters& parameters) : reach_(reaches(parameters)) {}
 
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    const State& state = cost_.accepted();
-    bound_met_ = active_.take_in(state);
-    settled_ = !bound_met_ && squared_step_sd(state, active_.moving()) < worth();
-    return bound_met_ || settled_ ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  Box within(const Box& range) const {
+    return {range.lower.cwiseMax(-radius_ * reach_), range.upper.cwiseMin(radius_ * reach_)};
   }
+  double size(const Eigen::VectorXd& step) const { return step.cwiseQuotient(reach_).cwiseAbs().maxCoeff(); }
 
-  bool bound_met() const { return bound_met_; }
-  bool settled() const { return settled_; }
-  /// Twice the fall of the cost that is worth a chain run.
-  double worth() const {
-    const State& state = cost_.accepted();
-    const double mean_square = 2 * state.cost / static_cast<double>(state.jacobian.rows());
-    return step_sd_ * step_sd_ * std::max(1.0, mean_square);
+  void after(const Eigen::VectorXd& step, double ratio) {
+    const double length = size(step);
+    if (ratio < poor_ratio)
+      radius_ = after_poor * length;
+    else if (ratio > good_ratio && length > 0.99 * radius_)
+      radius_ = std::min(after_good * radius_, largest_radius);
   }
+  void after_no_equilibrium(const Eigen::VectorXd& step) { radius_ = after_failure * size(step); }
 
  private:
-  const ChainCost& cost_;
-  ActiveSet& active_;
-  double step_sd_;
-  bool bound_met_ = false, settled_ = false;
+  Eigen::VectorXd reach_;
+  double radius_ = largest_radius;
 };
 
-ceres::Solver::Options solver_options(int most_iterations, Watch& watch) {
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_QR;
-  solver.max_num_iterations = most_iterations;
-  solver.line_search_interpolation_type = ceres::QUADRATIC;  // of values: no sensitivities at trial points
-  solver.function_tolerance = 1e-9;                          // settled comes first, but where distances have kinks
-  solver.parameter_tolerance = 1e-6;
-  solver.gradient_tolerance = 1e-10;
-  solver.max_num_consecutive_invalid_steps = 8;
-  solver.logging_type = ceres::SILENT;
-  solver.callbacks = {&watch};
-  return solver;
-}
-
-/// Ceres from @p u until settled, at a bound, or at its wits' end.
-ceres::Solver::Summary solve(ChainCost& cost, const FreeParameters& parameters, const ActiveSet& active, Watch& watch,
-                             int most_iterations, Eigen::VectorXd u) {
-  ceres::Problem::Options ownership;
-  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ceres::Problem problem(ownership);
-  std::vector<double*> blocks;
-  for (double& coordinate : u) blocks.push_back(&coordinate);
-  problem.AddResidualBlock(&cost, nullptr, blocks);
-  for (Eigen::Index i = 0; i < u.size(); ++i) {
-    double* block = blocks[static_cast<std::size_t>(i)];
-    if (!active.moves(i)) {
-      problem.SetParameterBlockConstant(block);
+/// Goes down until it has settled or finds no way. Notes in @p fit how it ended; returns the steps it took.
+int go_down(ChainCost& cost, const FreeParameters& parameters, const std::vector<bool>& held, double step_sd, int most,
+            Fit& fit) {
+  TrustRegion trust(parameters);
+  const auto ended = [&fit](bool converged, std::string message) {
+    fit.converged = converged;
+    fit.message = std::move(message);
+  };
+  for (int taken = 0; taken < most; ++taken) {
+    const State& state = cost.accepted();
+    const Box range = range_around(parameters, held, state.u);
+    const Eigen::VectorXd whole = box_step(state.information, state.gradient, range.lower, range.upper);
+    if (promise(state, whole) < worth(state, step_sd)) return ended(true, "settled"), taken;
+    const Box box = trust.within(range);
+    const Eigen::VectorXd step = box_step(state.information, state.gradient, box.lower, box.upper);
+    const double promised = promise(state, step), before = state.cost, length = trust.size(step);
+    const Eigen::VectorXd to = moved(parameters, state.u, step, range);
+    const std::optional<double> reached = cost.attempt(to);
+    if (!reached) {
+      if (length < shortest_failure)
+        return ended(false, fmt::format("the error falls toward {}, where no equilibrium was found",
+                                        values_of(parameters, to))),
+               taken + 1;
+      trust.after_no_equilibrium(step);
       continue;
     }
-    problem.SetParameterLowerBound(block, 0, parameters.lower()[i]);
-    problem.SetParameterUpperBound(block, 0, parameters.upper()[i]);
+    const double ratio = (before - *reached) / promised;
+    if (ratio > least_ratio)
+      cost.accept();
+    else if (length < shortest_step)
+      return ended(true, "no shorter step lowers the error"), taken + 1;
+    trust.after(step, ratio);
   }
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver_options(most_iterations, watch), &problem, &summary);
-  return summary;
+  ended(false, fmt::format("out of iterations ({})", most));
+  return most;
 }
 
 }  // namespace
 
+Eigen::VectorXd box_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& g, const Eigen::VectorXd& lower,
+                         const Eigen::VectorXd& upper) {
+  const Eigen::Index n = g.size();
+  Eigen::MatrixXd h = a;
+  h.diagonal().array() += least_curvature * std::max(a.diagonal().maxCoeff(), 1e-300);
+  Eigen::VectorXd s = Eigen::VectorXd::Zero(n);
+  std::vector<bool> held(static_cast<std::size_t>(n));
+  for (Eigen::Index i = 0; i < n; ++i)
+    held[static_cast<std::size_t>(i)] = (lower[i] >= 0 && g[i] >= 0) || (upper[i] <= 0 && g[i] <= 0);
+  // Every round holds a coordinate more, or lets one go after a fall: it ends by itself.
+  for (Eigen::Index round = 0; round < 8 * n + 8; ++round) {
+    std::vector<int> free;
+    for (Eigen::Index i = 0; i < n; ++i)
+      if (!held[static_cast<std::size_t>(i)]) free.push_back(static_cast<int>(i));
+    const Eigen::VectorXd gradient = g + h * s;
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(n);
+    if (!free.empty()) {
+      const Eigen::VectorXd part = -h(free, free).ldlt().solve(gradient(free));
+      for (std::size_t k = 0; k < free.size(); ++k) step[free[k]] = part[static_cast<Eigen::Index>(k)];
+    }
+    double share = 1;
+    int blocking = -1;
+    for (const int i : free) {
+      const double room = step[i] > 0 ? upper[i] - s[i] : lower[i] - s[i];
+      if (std::abs(step[i]) * share > std::abs(room)) share = std::abs(room / step[i]), blocking = i;
+    }
+    s += share * step;
+    if (blocking >= 0) {
+      s[blocking] = step[blocking] > 0 ? upper[blocking] : lower[blocking];
+      held[static_cast<std::size_t>(blocking)] = true;
+      continue;
+    }
+    const Eigen::VectorXd left = g + h * s;
+    Eigen::Index let_go = -1;
+    double most = 1e-10 * g.cwiseAbs().maxCoeff();
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const bool inward =
+          (s[i] <= lower[i] && left[i] < 0 && upper[i] > s[i]) || (s[i] >= upper[i] && left[i] > 0 && lower[i] < s[i]);
+      if (held[static_cast<std::size_t>(i)] && inward && std::abs(left[i]) > most) let_go = i, most = std::abs(left[i]);
+    }
+    if (let_go < 0) break;
+    held[static_cast<std::size_t>(let_go)] = false;
+  }
+  return s.cwiseMax(lower).cwiseMin(upper);
+}
+
 void descend(Evaluator& evaluator, const FreeParameters& parameters, const FitOptions& options, int start,
              const std::vector<bool>& held, const Linearisation* linearisation, bool rough, Fit& fit) {
-  ActiveSet active(parameters, held);
-  if (active.moving().empty()) throw InputError("every parameter is held: nothing to fit");
+  if (!held.empty() && std::all_of(held.begin(), held.end(), [](bool one) { return one; }))
+    throw InputError("every parameter is held: nothing to fit");
   if (std::none_of(fit.mask.begin(), fit.mask.end(), [](const auto& used) { return used.any(); }))
     throw NumericalFailure("no point of a scan lies over the skin as the model has it: nothing to fit to");
   ChainCost cost(evaluator, parameters, options, fit.mask, fit, start);
   cost.warm_start(fit.u, fit.prediction, linearisation);
-  Watch watch(cost, active, rough ? rough_sd : settled_sd);
-  Eigen::VectorXd u = fit.u;
-  int left = options.max_iterations;
-  // A round ends at a bound or settled; each coordinate comes and goes once, then it is given up.
-  for (Eigen::Index round = 0; round < 2 * parameters.size() + 2; ++round) {
-    const ceres::Solver::Summary summary = solve(cost, parameters, active, watch, left, u);
-    assert(cost.accepted().jacobian.size() > 0);  // the start is in range and its prediction known
-    u = cost.accepted().u;
-    left -= std::max(0, static_cast<int>(summary.iterations.size()) - 1);
-    fit.converged = watch.settled() || summary.termination_type == ceres::CONVERGENCE;
-    fit.message = watch.settled() ? "settled" : summary.message;
-    if (watch.bound_met()) {
-      // Nothing left to move: as settled as it can be, unless a bound lets go.
-      if (!active.moving().empty() && left > 0) continue;
-      fit.converged = active.moving().empty();
-      fit.message = fit.converged ? "settled with every parameter at its bound" : "out of iterations";
-    }
-    if (left <= 0 || !active.let_go(cost.accepted(), watch.worth())) break;
-  }
+  fit.iterations += go_down(cost, parameters, held, rough ? rough_sd : settled_sd, options.max_iterations, fit);
   const State& state = cost.accepted();
   fit.u = state.u;
   fit.prediction = state.prediction;
   fit.residuals = state.residuals;
   fit.linearisation = state.linearisation;
   fit.cost = state.cost;
-  fit.iterations += options.max_iterations - left;
 }
 
 }  // namespace supine::calibration

@@ -1,18 +1,32 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "calibration/chain_cost.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "calibration/tissue_range.h"
 #include "common/error.h"
 
 namespace supine::calibration {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-/// In ln(value): a modulus goes by a factor of 4.5 at most. A first step from far away may ask for a tissue that cannot
-/// carry itself, and finding that out costs more than many runs.
-constexpr double longest_step = 1.5;
+/// A run that costs more than so many times the dearest that was of use is given up: mostly no equilibrium is near.
+constexpr int cost_share = 3;
+constexpr int least_allowed = 100;  // EquilibriumSolver::work() that any run may take
+
+/// Bounds what a chain may cost for as long as it lives.
+class WorkLimit {
+ public:
+  WorkLimit(simulation::Chain& chain, int most) : chain_(chain) { chain.limit_work(most); }
+  ~WorkLimit() { chain_.limit_work({}); }
+  WorkLimit(const WorkLimit&) = delete;
+  WorkLimit& operator=(const WorkLimit&) = delete;
+
+ private:
+  simulation::Chain& chain_;
+};
 
 int prior_count(const FreeParameters& parameters, const FitOptions& options) {
   if (!options.use_priors) return 0;
@@ -34,8 +48,7 @@ ChainCost::ChainCost(Evaluator& evaluator, const FreeParameters& parameters, con
       best_rms_mm_(std::numeric_limits<double>::infinity()) {
   Eigen::Index points = 0;
   for (const auto& used : mask_) points += used.count();
-  set_num_residuals(static_cast<int>(points) + prior_count(parameters, options));
-  mutable_parameter_block_sizes()->assign(static_cast<std::size_t>(parameters.size()), 1);
+  rows_ = points + prior_count(parameters, options);
 }
 
 void ChainCost::warm_start(const Eigen::VectorXd& u, const Prediction& prediction, const Linearisation* linearisation) {
@@ -44,37 +57,34 @@ void ChainCost::warm_start(const Eigen::VectorXd& u, const Prediction& predictio
   if (linearisation != nullptr) accepted_.linearisation = *linearisation;
   trial_ = accepted_;
   trial_.residuals = residuals_of(evaluator_.scene(), prediction, mask_, options_.noise_mm);
-  if (linearisation == nullptr) note(u, false);
+  dearest_ = prediction.solution.work;
+  if (options_.near != nullptr) dearest_ = std::max(dearest_, options_.near->work);
+  linearise_trial();
+  if (linearisation != nullptr) return;
+  note(u, false);
+  log_.history.back().accepted = true;
 }
 
-bool ChainCost::too_far(const Eigen::VectorXd& u) const {
-  for (Eigen::Index j = 0; j < u.size() && accepted_.u.size() == u.size(); ++j)
-    if (parameters_.is_log(j) && std::abs(u[j] - accepted_.u[j]) > longest_step) return true;
-  return false;
-}
-
-bool ChainCost::predict(const Eigen::VectorXd& u) const {
-  if (trial_.u.size() == u.size() && trial_.u == u) return true;
-  if (too_far(u)) return false;  // the line search comes closer
+std::optional<double> ChainCost::attempt(const Eigen::VectorXd& u) {
   ++log_.evaluations;
   try {
-    const bool warm = accepted_.u.size() == u.size();
-    simulation::ChainSolution near;
-    if (warm)
-      near = extrapolated(accepted_.prediction.solution, accepted_.linearisation.by_coordinate, u - accepted_.u);
-    trial_.prediction = evaluator_.predict(parameters_.model(u), warm ? &near : nullptr);
+    const WorkLimit limit(evaluator_.chain(), std::max(least_allowed, cost_share * dearest_));
+    const simulation::ChainSolution near =
+        extrapolated(accepted_.prediction.solution, accepted_.linearisation.by_coordinate, u - accepted_.u);
+    trial_.prediction = evaluator_.predict(parameters_.model(u), &near);
   } catch (const NumericalFailure&) {
     ++log_.failed;
     note(u, true);
-    return false;
+    return {};
   }
   trial_.u = u;
   trial_.residuals = residuals_of(evaluator_.scene(), trial_.prediction, mask_, options_.noise_mm);
+  trial_.cost = 0.5 * weighted(trial_).squaredNorm();
   note(u, false);
-  return true;
+  return trial_.cost;
 }
 
-void ChainCost::note(const Eigen::VectorXd& u, bool failed) const {
+void ChainCost::note(const Eigen::VectorXd& u, bool failed) {
   const Eigen::VectorXd& d = trial_.residuals.distance_mm;
   const double count = static_cast<double>(d.size());
   FitEvaluation row{parameters_.values(u), nan, nan, nan, failed, false, start_};
@@ -85,53 +95,47 @@ void ChainCost::note(const Eigen::VectorXd& u, bool failed) const {
     best_rms_mm_ = std::min(best_rms_mm_, row.rms_mm);
   }
   log_.history.push_back(row);
-  if (options_.progress) options_.progress({log_.evaluations, log_.failed, row.rms_mm, best_rms_mm_});
+  if (options_.progress)
+    options_.progress(
+        {log_.evaluations, log_.failed, row.rms_mm, best_rms_mm_, !outside_tissue(parameters_, u).empty()});
 }
 
 Eigen::VectorXd ChainCost::weighted(const State& state) const {
-  Eigen::VectorXd residuals(num_residuals());
+  Eigen::VectorXd residuals(rows_);
   const Residuals& r = state.residuals;
   for (Eigen::Index i = 0; i < r.size(); ++i)
     residuals[i] = robust_residual(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i];
   Eigen::Index row = r.size();
-  for (Eigen::Index j = 0; j < state.u.size() && row < num_residuals(); ++j)
+  for (Eigen::Index j = 0; j < state.u.size() && row < rows_; ++j)
     if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)])
       residuals[row++] = (state.u[j] - prior->mean) / prior->sd;
   return residuals;
 }
 
-void ChainCost::accept(const Eigen::VectorXd& residuals) const {
+void ChainCost::accept() {
+  linearise_trial();
+  log_.history.back().accepted = true;
+}
+
+void ChainCost::linearise_trial() {
   const Eigen::VectorXd& u = trial_.u;
   const simulation::Sensitivities sensitivities(evaluator_.chain(), parameters_.model(u), trial_.prediction.solution);
   trial_.linearisation = linearise(evaluator_, sensitivities, parameters_, u, trial_.prediction, trial_.residuals);
+  const Eigen::VectorXd residuals = weighted(trial_);
   trial_.cost = 0.5 * residuals.squaredNorm();
-  trial_.jacobian.setZero(num_residuals(), u.size());
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(rows_, u.size());
   const Residuals& r = trial_.residuals;
   for (Eigen::Index i = 0; i < r.size(); ++i)
-    trial_.jacobian.row(i) =
+    jacobian.row(i) =
         trial_.linearisation.slope.row(i) * (robust_slope(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i]);
   Eigen::Index row = r.size();
-  for (Eigen::Index j = 0; j < u.size() && row < num_residuals(); ++j)
-    if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)])
-      trial_.jacobian(row++, j) = 1 / prior->sd;
-  trial_.gradient = trial_.jacobian.transpose() * residuals;
-  trial_.information = trial_.jacobian.transpose() * trial_.jacobian;
+  for (Eigen::Index j = 0; j < u.size() && row < rows_; ++j)
+    if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)]) jacobian(row++, j) = 1 / prior->sd;
+  trial_.gradient = jacobian.transpose() * residuals;
+  trial_.information = jacobian.transpose() * jacobian;
+  trial_.rows = rows_;
+  dearest_ = std::max(dearest_, trial_.prediction.solution.work);
   accepted_ = trial_;
-  if (!log_.history.empty()) log_.history.back().accepted = true;
-}
-
-bool ChainCost::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
-  Eigen::VectorXd u(parameters_.size());
-  for (Eigen::Index j = 0; j < u.size(); ++j) u[j] = parameters[j][0];
-  const bool known = accepted_.jacobian.size() > 0 && accepted_.u == u;
-  if (!known && !predict(u)) return false;
-  const Eigen::VectorXd values = weighted(known ? accepted_ : trial_);
-  Eigen::Map<Eigen::VectorXd>(residuals, num_residuals()) = values;
-  if (jacobians == nullptr) return true;
-  if (!known) accept(values);
-  for (Eigen::Index j = 0; j < u.size(); ++j)
-    if (jacobians[j] != nullptr) Eigen::Map<Eigen::VectorXd>(jacobians[j], num_residuals()) = accepted_.jacobian.col(j);
-  return true;
 }
 
 }  // namespace supine::calibration

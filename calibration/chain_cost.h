@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <ceres/cost_function.h>
+#include <optional>
 
 #include "calibration/least_squares.h"
 
 namespace supine::calibration {
 
-/// Ceres' view of one chain run: weighted robust distances and priors, with their Jacobian; a block per parameter. Used
-/// by bounded_descent.cpp.
-///
-/// Ceres asks for a Jacobian at accepted points only (with a line search that interpolates values alone), so the
-/// solution found there is the one the next trials start from. Asked again for the accepted point it runs nothing.
-class ChainCost : public ceres::CostFunction {
+/// What a descent minimises: half the sum of squares of weighted robust distances and priors, with its slopes. Trials
+/// start from the accepted point, moved along its slopes. Used by bounded_descent.cpp.
+class ChainCost {
  public:
   /// @param mask  the points that take part
   ChainCost(Evaluator& evaluator, const FreeParameters& parameters, const FitOptions& options, PointMask mask, Fit& log,
@@ -21,7 +18,11 @@ class ChainCost : public ceres::CostFunction {
   /// Begins at a known prediction instead of an unloaded shape.
   void warm_start(const Eigen::VectorXd& u, const Prediction& prediction, const Linearisation* linearisation);
 
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+  /// Runs the chain at @p u. @return its cost; none where no equilibrium is found, or not for three times what the
+  /// dearest accepted run has cost
+  std::optional<double> attempt(const Eigen::VectorXd& u);
+  /// Makes the last attempt the accepted point, with its slopes.
+  void accept();
 
   /// State at the last accepted point.
   struct State {
@@ -29,19 +30,17 @@ class ChainCost : public ceres::CostFunction {
     Prediction prediction;
     Residuals residuals;
     Linearisation linearisation;
-    double cost = 0;              ///< half the sum of squares of what Ceres sees
-    Eigen::MatrixXd jacobian;     ///< of what Ceres sees; empty before the first point was accepted
-    Eigen::VectorXd gradient;     ///< of the cost
+    double cost = 0;
+    Eigen::VectorXd gradient;     ///< of the cost; empty before the first point was accepted
     Eigen::MatrixXd information;  ///< JᵀJ
+    Eigen::Index rows = 0;        ///< of J
   };
   const State& accepted() const { return accepted_; }
 
  private:
-  bool predict(const Eigen::VectorXd& u) const;
-  bool too_far(const Eigen::VectorXd& u) const;
-  void note(const Eigen::VectorXd& u, bool failed) const;
+  void note(const Eigen::VectorXd& u, bool failed);
   Eigen::VectorXd weighted(const State& state) const;
-  void accept(const Eigen::VectorXd& residuals) const;
+  void linearise_trial();
 
   Evaluator& evaluator_;
   const FreeParameters& parameters_;
@@ -49,8 +48,10 @@ class ChainCost : public ceres::CostFunction {
   PointMask mask_;
   Fit& log_;
   int start_;
-  mutable State accepted_, trial_;
-  mutable double best_rms_mm_;
+  Eigen::Index rows_;
+  State accepted_, trial_;
+  double best_rms_mm_;
+  int dearest_ = 0;  // ChainSolution::work of an accepted run
 };
 
 }  // namespace supine::calibration

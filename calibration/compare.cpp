@@ -107,7 +107,7 @@ Comparison compare(const ModelSkin& model, const Scan& scan, const SkinAreas& ar
   if (distances.empty()) {
     throw InputError(fmt::format(
         "none of the {} scan points lies over the model's skin: each is closest to the skin's border. Compare with a "
-        "scan of the imaged breast",
+        "scan of the imaged body",
         scan.points().rows()));
   }
   result.scan_points_used = static_cast<int>(distances.size());

@@ -37,6 +37,7 @@ void search(Evaluator& evaluator, const FreeParameters& parameters, const FitOpt
     if (pass > 0 && alike(mask, fit.mask)) return;
     fit.mask = mask;
     descend(evaluator, parameters, options, start, {}, pass > 0 ? &fit.linearisation : nullptr, false, fit);
+    if (!fit.converged) return;  // where this found no way, other points would find none either
   }
 }
 

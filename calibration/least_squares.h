@@ -14,6 +14,7 @@ struct FitProgress {
   int evaluations, failed;  ///< chain runs so far, and those without equilibrium
   double rms_mm;            ///< of this evaluation; NaN when it failed
   double best_rms_mm;
+  bool outside_tissue = false;  ///< a modulus of this evaluation is none that tissue has (tissue_range.h)
 };
 
 struct FitOptions {
@@ -55,8 +56,8 @@ struct Fit {
 /// Bounded nonlinear least squares (bounded_descent.h) on the signed distances scan → model, with exact sensitivities:
 ///   min ½ Σ g(d_i)²/σ_i² + ½ Σ (u_j − m_j)²/s_j²,   ½ g(d)² = δ² (√(1 + (d/δ)²) − 1)   (pseudo-Huber, δ = robust_mm).
 /// Which scan points take part is decided at the start of a descent and again at its end, until 99 % of them stay.
-/// A trial without equilibrium is a rejected step. Each run starts at the last accepted shape, moved along the
-/// sensitivities.
+/// A trial without equilibrium, or that takes too long to find one, is a rejected step. Each run starts at the last
+/// accepted shape, moved along the sensitivities.
 /// @throws NumericalFailure  no equilibrium, or no scan point over the skin, at any start
 Fit fit_least_squares(Evaluator& evaluator, const FreeParameters& parameters, const FitOptions& options);
 

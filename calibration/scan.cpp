@@ -134,8 +134,8 @@ double share_behind(const Scan& scan, const reconstruction::Surface& muscle) {
 Scan::Scan(const reconstruction::Surface& surface, const ModelSkin& model, const std::string& name)
     : distance_(prepared(surface, model, name)) {}
 
-void check_placement(const Scan& scan, const ModelSkin& model, const reconstruction::Surface& muscle,
-                     const std::string& name) {
+void check_frame(const Scan& scan, const ModelSkin& model, const reconstruction::Surface& muscle,
+                 const std::string& name) {
   const double as_is = median_distance_mm(scan, model, false);
   const double behind = share_behind(scan, muscle);
   if (as_is <= flip_from_mm && behind <= most_behind) return;
@@ -147,12 +147,19 @@ void check_placement(const Scan& scan, const ModelSkin& model, const reconstruct
         "comment line \"frame RAS, unit mm\")",
         name, as_is, 100 * behind, negated));
   }
+}
+
+void check_placement(const Scan& scan, const ModelSkin& model, const reconstruction::Surface& muscle,
+                     const std::string& name) {
+  check_frame(scan, model, muscle, name);
+  const double as_is = median_distance_mm(scan, model, false);
   if (as_is > far_mm) {
     throw InputError(
         fmt::format("{}: lies {:.1f} mm from the model's skin (median; bound {} mm; {:.1f} mm with x and y negated). "
                     "Bring the scan into the frame of the image (LPS, mm)",
-                    name, as_is, far_mm, negated));
+                    name, as_is, far_mm, median_distance_mm(scan, model, true)));
   }
+  const double behind = share_behind(scan, muscle);
   if (behind > most_behind) {
     throw InputError(
         fmt::format("{}: {:.0f} % of its points over the chest muscle lie behind it (bound {:.0f} %). Check the frame "

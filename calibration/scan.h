@@ -32,12 +32,18 @@ class Scan {
   SurfaceDistance distance_;
 };
 
-/// Refuses a scan that does not lie at the body, and says what is wrong with it.
+/// Refuses a scan that was written as RAS: diag(−1, −1, 1) brings it from more than 10 mm to less than a third of its
+/// distance (two thirds when more than half of its points over the muscle sheet lie behind it).
 ///
 /// Distances are medians, the smaller of scan → skin and skin → scan, so that neither a scan of the whole trunk nor
-/// one of a small patch looks far away. A scan is refused when it is further than 30 mm, or when more than half of its
-/// points over the muscle sheet lie behind it, or when diag(−1, −1, 1) brings it from more than 10 mm to less than a
-/// third of its distance (two thirds when it lies behind the muscle): then it was written as RAS.
+/// one of a small patch looks far away.
+/// @param muscle  breast-facing muscle sheet, normals toward the breast; without triangles it is not looked at
+/// @throws InputError  with the distances and what to write
+void check_frame(const Scan& scan, const ModelSkin& model, const reconstruction::Surface& muscle,
+                 const std::string& name = "the scan");
+
+/// Refuses a scan that does not lie at the body, and says what is wrong with it: as check_frame(), and when it is
+/// further than 30 mm, or when more than half of its points over the muscle sheet lie behind it.
 /// @param muscle  breast-facing muscle sheet, normals toward the breast; without triangles it is not looked at
 /// @throws InputError  with the distances and what to write
 void check_placement(const Scan& scan, const ModelSkin& model, const reconstruction::Surface& muscle,

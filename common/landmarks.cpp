@@ -43,6 +43,18 @@ double sigma(const std::string& field, const std::string& place) {
   return value;
 }
 
+/// Three landmarks of a body never lie in one millimetre.
+void check_extent(const Landmarks& landmarks, const std::filesystem::path& file) {
+  constexpr double least_mm = 3;
+  if (landmarks.names.size() < 3) return;
+  const double extent = (landmarks.points.colwise().maxCoeff() - landmarks.points.colwise().minCoeff()).norm();
+  if (extent < least_mm)
+    throw InputError(fmt::format(
+        "{}: its {} landmarks lie within {:.2g} mm (diagonal of their box, bound {} mm): they look as if they were in "
+        "metres; write mm",
+        file.string(), landmarks.names.size(), extent, least_mm));
+}
+
 }  // namespace
 
 Landmarks read_landmarks(const std::filesystem::path& file, const std::string& frame) {
@@ -65,6 +77,8 @@ Landmarks read_landmarks(const std::filesystem::path& file, const std::string& f
     if (fields.size() != header.size())
       throw InputError(
           fmt::format("{}: {} fields, {} expected: {}", place, fields.size(), header.size(), fmt::join(header, ",")));
+    if (fields[0].find_first_not_of(" \t") == std::string::npos)
+      throw InputError(fmt::format("{}: the landmark has no name", place));
     if (std::find(landmarks.names.begin(), landmarks.names.end(), fields[0]) != landmarks.names.end())
       throw InputError(fmt::format("{}: landmark '{}' stands twice; each name once", place, fields[0]));
     landmarks.names.push_back(fields[0]);
@@ -72,8 +86,12 @@ Landmarks read_landmarks(const std::filesystem::path& file, const std::string& f
     if (header == with_sigma) sigmas.push_back(sigma(fields[4], place));
     if (frame == "RAS") points.back().head<2>() *= -1;
   }
+  if (points.empty())
+    throw InputError(file.string() +
+                     ": holds no landmark, only a header; add rows name,x,y,z in mm, or leave the file out");
   landmarks.points.resize(static_cast<Eigen::Index>(points.size()), 3);
   for (std::size_t i = 0; i < points.size(); ++i) landmarks.points.row(static_cast<Eigen::Index>(i)) = points[i];
+  check_extent(landmarks, file);
   landmarks.sigma_mm = Eigen::Map<const Eigen::VectorXd>(sigmas.data(), static_cast<Eigen::Index>(sigmas.size()));
   return landmarks;
 }

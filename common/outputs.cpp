@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <system_error>
@@ -36,6 +37,21 @@ void register_temporary(const std::string& path) {
 void unregister_temporary(const std::string& path) {
   for (int i = 0; i < max_registered; ++i)
     if (registered_in_use[i].load() && path == registered_path[i]) registered_in_use[i].store(false);
+}
+
+/// Part files of a process that is gone, by kill or loss of power: nobody else removes them.
+void remove_orphans(const std::filesystem::path& folder, const std::string& stem, const std::string& extension) {
+  const std::string before = "." + stem + ".part";
+  std::error_code failed;
+  std::vector<std::filesystem::path> orphans;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(before) || !name.ends_with(extension)) continue;
+    const std::string digits = name.substr(before.size(), name.size() - before.size() - extension.size());
+    if (digits.empty() || digits.size() > 9 || digits.find_first_not_of("0123456789") != std::string::npos) continue;
+    if (kill(static_cast<pid_t>(std::stol(digits)), 0) != 0 && errno == ESRCH) orphans.push_back(entry.path());
+  }
+  for (const auto& orphan : orphans) std::filesystem::remove(orphan, failed);
 }
 
 extern "C" void remove_temporaries_and_exit(int) {
@@ -74,6 +90,7 @@ std::filesystem::path Outputs::stage(const std::filesystem::path& target) {
   if (fs::exists(target) && !force_)
     throw InputError("output file " + target.string() + " exists; add --force to replace it or choose another with -o");
 
+  remove_orphans(folder, target.stem().string(), target.extension().string());
   const fs::path temporary =
       folder / fmt::format(".{}.part{}{}", target.stem().string(), getpid(), target.extension().string());
   const int descriptor = open(temporary.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0644);

@@ -31,7 +31,7 @@ std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const 
   const simulation::Sensitivities sensitivities(evaluator.chain(), model, fit.prediction.solution);
   std::vector<Candidate> candidates;
   for (const Effect* effect : simulation::catalogue()) {
-    if (has(model, *effect)) continue;
+    if (has(model, *effect) || !effect->belongs_to(*evaluator.scene().mesh, *evaluator.scene().anatomy)) continue;
     Candidate candidate{effect->name(), {}, Eigen::MatrixXd(fit.residuals.size(), 0), {}};
     for (const Parameter& row : effect->parameters()) {
       if (row.shape) continue;

@@ -24,10 +24,26 @@ struct Option {
   std::string name;
   Eigen::Vector3d down;
   bool again = false;
+  std::string area = {};  ///< of the skin that is measured; empty: all of it
 };
+
+/// Of an object: skin that the scan did not see, in the pose it was seen in, or the body turned round.
+std::vector<Option> options_of_object(const Subject& subject) {
+  const simulation::PoseLoad& pose = subject.scene.measurements[0]->pose;
+  std::vector<Option> options = {{pose.name + ", once more", pose.gravity, true},
+                                 {pose.name + ", all of the skin", pose.gravity}};
+  for (const std::string& area : subject.scene.anatomy->all_area_names())
+    options.push_back({pose.name + ", the skin " + (area == "near the support" ? area : "of the " + area), pose.gravity,
+                       false, area});
+  options.push_back({"turned upside down", -pose.gravity});
+  const Eigen::Vector3d side = pose.gravity.cross(subject.scene.anatomy->lateral);
+  if (side.norm() > 0.1) options.push_back({"turned on its side", side.normalized()});
+  return options;
+}
 
 /// From the gravity of the fitted pose and the patient's own directions (LPS: +z is the head).
 std::vector<Option> options_of(const Subject& subject) {
+  if (subject.scene.anatomy->is_object()) return options_of_object(subject);
   const Eigen::Vector3d down = subject.scene.measurements[0]->pose.gravity, feet(0, 0, -1);
   const auto tilted = [&down](double degrees, const Eigen::Vector3d& to) -> Eigen::Vector3d {
     const double a = degrees * std::numbers::pi / 180;
@@ -68,9 +84,14 @@ class Pose {
     solution_ = chain_.solve(found.base.model, &near);
     sensitivities_ = std::make_unique<simulation::Sensitivities>(chain_, found.base.model, solution_);
     const calibration::ModelSkin skin(*subject.scene.mesh, solution_.poses[0].x);
-    nodes_ = skin.nodes();
-    place_ = skin.node_points();
-    normal_ = skin.node_normals();
+    std::vector<int> seen;
+    for (std::size_t i = 0; i < skin.nodes().size(); ++i)
+      if (option.area.empty() || subject.scene.anatomy->area_name_of(skin.nodes()[i]) == option.area) {
+        nodes_.push_back(skin.nodes()[i]);
+        seen.push_back(static_cast<int>(i));
+      }
+    place_ = skin.node_points()(seen, Eigen::all);
+    normal_ = skin.node_normals()(seen, Eigen::all);
     factorise();
   }
 

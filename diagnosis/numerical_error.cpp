@@ -92,7 +92,7 @@ simulation::SolveOptions enough_straight() {
 calibration::Prediction predicted_on(const calibration::MeasuredScene& scene, const meshing::TetMesh& mesh,
                                      const simulation::Model& model, const simulation::ChainSolution* near,
                                      const simulation::SolveOptions& options) {
-  const meshing::Anatomy anatomy = meshing::compute_anatomy(mesh, scene.anatomy->side);
+  const meshing::Anatomy anatomy = meshing::compute_anatomy(mesh, scene.anatomy->side, scene.anatomy->imaged_pose);
   calibration::MeasuredScene other = scene;
   other.mesh = &mesh;
   other.anatomy = &anatomy;

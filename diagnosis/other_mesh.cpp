@@ -100,14 +100,19 @@ TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const Tet
   options.edge_mm = edge_mm;
   TetMesh other = meshing::tetrahedralise(surface, options, "the boundary of the mesh");
   other.muscle = mesh.muscle;
+  other.support_names = mesh.support_names;
+  other.muscle_support = mesh.muscle_support;
+  other.part_names = mesh.part_names;
   const CentreGrid grid(cell_centres(mesh), edge_mm);
   const Points centres = cell_centres(other);
   other.tissue.resize(other.cells.rows());
   other.fraction.resize(other.cells.rows(), mesh.fraction.cols());
+  other.part_fraction.resize(other.cells.rows(), mesh.part_fraction.cols());
   for (Eigen::Index c = 0; c < other.cells.rows(); ++c) {
     const int from = grid.nearest(centres.row(c));
     other.tissue[c] = mesh.tissue[from];
     other.fraction.row(c) = mesh.fraction.row(from);
+    other.part_fraction.row(c) = mesh.part_fraction.row(from);
   }
   if (mesh.order() == 2) {
     other = meshing::to_quadratic(other);
@@ -115,7 +120,7 @@ TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const Tet
     onto_its_faces.smooth_share = 0;  // no voxels' noise in them
     meshing::curve_boundary(other, meshing::face_pieces(mesh), nullptr, onto_its_faces);
   }
-  meshing::mark_ligament_ring(other, anatomy);
+  if (!anatomy.is_object()) meshing::mark_ligament_ring(other, anatomy);
   return other;
 }
 
@@ -136,6 +141,7 @@ TetMesh coarser_mesh(const TetMesh& mesh, const meshing::Anatomy& anatomy, doubl
   options.target_triangles = static_cast<int>(triangle_share * static_cast<double>(surface.triangles.rows()));
   options.max_distance_mm = std::max(farthest_mm, edge_share * meshing::mean_edge_mm(surface));
   options.method = meshing::DecimateMethod::triangles;
+  if (anatomy.is_object()) options.sharp_deg = 40;  // a body from CAD keeps its edges
   const reconstruction::Surface coarse = meshing::decimate(surface, options).surface;
   return filled(coarse, meshing::mean_edge_mm(coarse), mesh, anatomy);
 }

@@ -12,6 +12,7 @@
 #include "common/error.h"
 #include "meshing/anatomy/cleft.h"
 #include "meshing/anatomy/foot.h"
+#include "meshing/anatomy/object_frame.h"
 #include "meshing/topology.h"
 #include "segmentation/tissue.h"
 
@@ -244,17 +245,21 @@ Anatomy two_breasts(const TetMesh& mesh, const std::shared_ptr<const MuscleDista
 
 }  // namespace
 
-Anatomy compute_anatomy(const TetMesh& mesh, const std::string& side) {
+Anatomy compute_anatomy(const TetMesh& mesh, const std::string& side, const std::string& imaged_pose) {
+  if (side == "none") return object_frame(mesh, imaged_pose);
   if (side != "left" && side != "right" && side != "both") {
-    throw InputError(fmt::format("side is \"{}\"; the anatomy needs left, right or both", side));
+    throw InputError(fmt::format("side is \"{}\"; the anatomy needs left, right or both, or none for an object", side));
   }
   const std::vector<Piece> skin = pieces_of(mesh, is_skin, "skin"), inner = pieces_of(mesh, is_inner, "inner");
   Eigen::Matrix<double, 2, 3> box;
   box.row(0) = mesh.points.colwise().minCoeff();
   box.row(1) = mesh.points.colwise().maxCoeff();
   const auto muscle = std::make_shared<const MuscleDistance>(mesh.muscle, box);
-  if (side == "both") return two_breasts(mesh, muscle, skin, inner);
-  return one_breast(mesh, side, muscle, skin, inner, std::vector<char>(mesh.points.rows(), 1));
+  Anatomy anatomy = side == "both"
+                        ? two_breasts(mesh, muscle, skin, inner)
+                        : one_breast(mesh, side, muscle, skin, inner, std::vector<char>(mesh.points.rows(), 1));
+  anatomy.imaged_pose = imaged_pose;
+  return anatomy;
 }
 
 }  // namespace supine::meshing

@@ -11,14 +11,20 @@
 
 namespace supine::meshing {
 
-/// The anatomical frame of one breast, computed once per case from the imaged (prone) mesh and the muscle.
+/// The anatomical frame of one breast, computed once per case from the imaged mesh and the muscle.
+///
+/// With side "none" the body is an object (docs/bodies.md): the supports stand for the muscle; lateral and head are the
+/// two longest directions of its skin, the first away from the supports, q counts along them from the skin's centre in
+/// units of foot_radius_mm, half of its length; there is no mound and no nipple, thickness_mm is the distance to the
+/// nearest support and the areas are thirds of its largest.
 ///
 /// With side "both", `breasts` holds the frame of each, `breast` says whose a point is, and q is that of the point's
 /// own breast: lateral is positive to the outer side of both. outward is then the mean of the two, lateral the left
 /// one's, heights and radii the larger; what belongs to one breast is asked of breast_frame().
 struct Anatomy {
-  std::string side;         ///< left, right or both
-  Eigen::Vector3d outward;  ///< unit; mean outward normal of the muscle under the mound
+  std::string side;                   ///< left, right or both; none of an object
+  std::string imaged_pose = "prone";  ///< the pose the mesh was imaged in; undeformed: free of load
+  Eigen::Vector3d outward;            ///< unit; mean outward normal of the muscle under the mound
   Eigen::Vector3d lateral;  ///< unit, orthogonal to outward; toward the patient's own outer side (+x LPS for left)
   Eigen::Vector3d head;     ///< unit, orthogonal to both; toward the head
   Eigen::Vector3d foot_centre_mm;  ///< on the muscle, centre of the mound's footprint
@@ -34,12 +40,18 @@ struct Anatomy {
   Eigen::VectorXd thickness_mm;  ///< #points; φ at each imaged point: height over the muscle
   int nipple_point = -1;  ///< skin point furthest from the muscle within the mound, or where the nipple tissue is
   std::shared_ptr<const MuscleDistance> muscle;
+  /// To each support, in the order of TetMesh::support_names; empty where the muscle is the one support.
+  std::vector<std::shared_ptr<const MuscleDistance>> supports;
   double sternum_x_mm = 0;       ///< side both: the plane x = sternum_x_mm (LPS) parts the two
   std::vector<Anatomy> breasts;  ///< side both: left, right; else empty
   Eigen::VectorXi breast;        ///< #points; row of `breasts` a point belongs to; empty for one breast
 
   /// The frame of one breast: @p which is a row of `breasts`, or anything where there is one breast only.
   const Anatomy& breast_frame(int which) const { return breasts.empty() ? *this : breasts[which]; }
+  const std::shared_ptr<const MuscleDistance>& support(std::size_t row) const {
+    return supports.empty() ? muscle : supports[row];
+  }
+  bool is_object() const { return side == "none"; }
   /// Row of `breasts` of a point (of the mesh), 0 where there is one breast only.
   int breast_of(Eigen::Index point) const { return breasts.empty() ? 0 : breast[point]; }
   /// q of a point of the mesh; with two breasts on one chart of both: measured from the sternum, positive to the left,
@@ -62,9 +74,13 @@ struct Anatomy {
 /// All names area_name() can return, in the order tables list them.
 const std::vector<std::string>& area_names();
 
+/// The same of an object.
+const std::vector<std::string>& object_area_names();
+
 /// @param mesh  imaged mesh with its muscle sheet
-/// @param side  left, right or both
+/// @param side         left, right, both, or none for an object
+/// @param imaged_pose  the pose the mesh was imaged in
 /// @throws InputError  no inner or no skin faces, no mound over the muscle; both: no cleft between two mounds
-Anatomy compute_anatomy(const TetMesh& mesh, const std::string& side);
+Anatomy compute_anatomy(const TetMesh& mesh, const std::string& side, const std::string& imaged_pose = "prone");
 
 }  // namespace supine::meshing

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include <algorithm>
 #include <cmath>
 
 #include "meshing/anatomy.h"
@@ -47,16 +48,26 @@ Eigen::Vector2d Anatomy::chart(Eigen::Index point) const {
 
 std::string Anatomy::area_name_of(Eigen::Index point) const {
   const Eigen::Vector2d q_point = q.row(point);
+  if (is_object()) {
+    const auto third = static_cast<int>(3 * thickness_mm[point] / mound_height_mm);
+    return object_area_names()[std::clamp(third, 0, 2)];
+  }
   if (breasts.empty()) return area_name(q_point);
   const Anatomy& own = breast_frame(breast_of(point));
   return own.side + " " + own.area_name(q_point);
 }
 
 std::vector<std::string> Anatomy::all_area_names() const {
+  if (is_object()) return object_area_names();
   if (breasts.empty()) return area_names();
   std::vector<std::string> names;
   for (const Anatomy& one : breasts)
     for (const std::string& name : area_names()) names.push_back(one.side + " " + name);
+  return names;
+}
+
+const std::vector<std::string>& object_area_names() {
+  static const std::vector<std::string> names = {"near the support", "middle", "far end"};
   return names;
 }
 

@@ -20,6 +20,7 @@
 #include <limits>
 
 #include "common/error.h"
+#include "meshing/supports.h"
 #include "meshing/vtu_reader.h"
 #include "segmentation/tissue.h"
 
@@ -79,6 +80,15 @@ void add_cell_arrays(vtkUnstructuredGrid& grid, const TetMesh& mesh) {
     fraction.topRows(cells) = mesh.fraction.col(t);
     grid.GetCellData()->AddArray(to_array(fmt::format("fraction_{}", segmentation::tissue_names[t]), fraction));
   }
+  for (std::size_t p = 0; p < mesh.part_names.size(); ++p) {
+    Table share = Table::Zero(cells + faces, 1);
+    share.topRows(cells) = mesh.part_fraction.col(static_cast<Eigen::Index>(p));
+    grid.GetCellData()->AddArray(to_array("part_" + mesh.part_names[p], share));
+  }
+  if (mesh.support_names.empty()) return;
+  Indices support = Indices::Constant(cells + faces, 1, -1);
+  support.bottomRows(faces) = support_of_faces(mesh);
+  grid.GetCellData()->AddArray(to_int_array("support", support));
 }
 
 void add_field_data(vtkUnstructuredGrid& grid, const TetMesh& mesh, const std::string& side) {
@@ -90,6 +100,10 @@ void add_field_data(vtkUnstructuredGrid& grid, const TetMesh& mesh, const std::s
   fields.AddArray(to_strings("region_names", reconstruction::region_names));
   fields.AddArray(to_array("muscle_points_mm", mesh.muscle.points));
   fields.AddArray(to_int_array("muscle_triangles", mesh.muscle.triangles));
+  if (!mesh.part_names.empty()) fields.AddArray(to_strings("part_names", mesh.part_names));
+  if (mesh.support_names.empty()) return;
+  fields.AddArray(to_strings("support_names", mesh.support_names));
+  fields.AddArray(to_int_array("muscle_support", mesh.muscle_support));
 }
 
 vtkSmartPointer<vtkUnstructuredGrid> to_grid(const TetMesh& mesh, const Points& positions, const std::string& side) {

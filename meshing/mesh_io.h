@@ -17,7 +17,9 @@ using NamedTables = std::vector<std::pair<std::string, Table>>;
 /// Writes @p mesh as .vtu: the tetrahedra, then the boundary triangles, as cells of one grid (linear or quadratic,
 /// VTK node order). Cell arrays `tissue` (-1 on triangles), `fraction_<tissue>` of the meshed tissues, `region`
 /// (0 on tetrahedra); field data `frame` = LPS, `unit` = mm, `tissue_names`, `region_names`, the muscle sheet as
-/// `muscle_points_mm` (#P by 3) and `muscle_triangles` (#T by 3), and `side` when @p side is not empty.
+/// `muscle_points_mm` (#P by 3) and `muscle_triangles` (#T by 3), and `side` when @p side is not empty. Of a mesh with
+/// named parts and supports also cell arrays `part_<name>` and `support` (-1 where there is none), field data
+/// `part_names`, `support_names` and `muscle_support` (#T).
 /// The same mesh gives the same bytes.
 /// @throws InputError  when the file cannot be written
 void write_mesh(const TetMesh& mesh, const std::filesystem::path& file, const std::string& side = {});

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "common/arrays.h"
 #include "reconstruction/surface.h"
 #include "segmentation/tissue.h"
@@ -21,6 +24,15 @@ struct TetMesh {
   Eigen::VectorXi region;          ///< #F, values of reconstruction::Region, never none
   Eigen::VectorXi face_cell;       ///< #F, the cell the face belongs to
   reconstruction::Surface muscle;  ///< the breast-facing muscle sheet, normals toward the breast; travels with the mesh
+
+  /// Of an object, what holds it, by name, and of each triangle of `muscle` the row of its support. Empty: the muscle
+  /// is the one support.
+  std::vector<std::string> support_names;
+  Eigen::VectorXi muscle_support;
+  /// Named parts (beside the tissues): the share of each in each cell, #C by #parts; a cell's shares may sum to less
+  /// than 1.
+  std::vector<std::string> part_names;
+  Table part_fraction;
 
   int order() const { return cells.cols() == 10 ? 2 : 1; }
 };

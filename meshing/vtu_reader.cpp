@@ -191,6 +191,35 @@ void VtuReader::read_muscle(TetMesh& mesh) const {
   }
 }
 
+std::vector<std::string> VtuReader::texts(const std::string& field) const {
+  auto* array = vtkStringArray::SafeDownCast(grid_->vtk->GetFieldData()->GetAbstractArray(field.c_str()));
+  std::vector<std::string> values;
+  for (vtkIdType i = 0; array != nullptr && i < array->GetNumberOfValues(); ++i) values.push_back(array->GetValue(i));
+  return values;
+}
+
+void VtuReader::read_parts(TetMesh& mesh) const {
+  mesh.part_names = texts("part_names");
+  mesh.part_fraction.resize(mesh.cells.rows(), static_cast<Eigen::Index>(mesh.part_names.size()));
+  for (std::size_t p = 0; p < mesh.part_names.size(); ++p)
+    mesh.part_fraction.col(static_cast<Eigen::Index>(p)) =
+        cell_column("part_" + mesh.part_names[p]).col(0).head(mesh.cells.rows());
+}
+
+void VtuReader::read_supports(TetMesh& mesh) const {
+  mesh.support_names = texts("support_names");
+  if (mesh.support_names.empty()) return;
+  vtkDataArray* of_triangle = grid_->vtk->GetFieldData()->GetArray("muscle_support");
+  if (of_triangle == nullptr || of_triangle->GetNumberOfTuples() != mesh.muscle.triangles.rows())
+    throw InputError(
+        fmt::format("{}: field data muscle_support needs one number per triangle of muscle_triangles", file_.string()));
+  mesh.muscle_support = to_table(*of_triangle).col(0).cast<int>();
+  if (mesh.muscle_support.minCoeff() < 0 ||
+      mesh.muscle_support.maxCoeff() >= static_cast<int>(mesh.support_names.size()))
+    throw InputError(
+        fmt::format("{}: muscle_support names a support that support_names does not have", file_.string()));
+}
+
 TetMesh VtuReader::mesh(const Table& displacement) const {
   TetMesh mesh;
   mesh.points = positions();
@@ -198,6 +227,8 @@ TetMesh VtuReader::mesh(const Table& displacement) const {
   read_topology(mesh);
   read_tissue(mesh);
   read_muscle(mesh);
+  read_parts(mesh);
+  read_supports(mesh);
   try {
     check_mesh(mesh);
   } catch (const InputError& error) {

@@ -32,6 +32,9 @@ class VtuReader {
   void read_muscle(TetMesh& mesh) const;
   void read_topology(TetMesh& mesh) const;
   void read_tissue(TetMesh& mesh) const;
+  void read_parts(TetMesh& mesh) const;
+  void read_supports(TetMesh& mesh) const;
+  std::vector<std::string> texts(const std::string& field) const;  // string field data; none where there is no such
 
   std::filesystem::path file_;
   std::unique_ptr<Grid> grid_;

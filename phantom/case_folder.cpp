@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "common/error.h"
@@ -99,16 +100,16 @@ std::string gzipped(const std::vector<std::uint8_t>& bytes) {
   return packed;
 }
 
-std::string nrrd_text(const segmentation::LabelImage& labels) {
-  const segmentation::Grid& grid = labels.grid;
+/// @param bytes  of the voxels, little endian
+std::string nrrd_text(const segmentation::Grid& grid, const char* type, const std::vector<std::uint8_t>& bytes) {
   const Eigen::Vector3d& step = grid.spacing_mm;
   return fmt::format(
-             "NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\n"
+             "NRRD0004\ntype: {}\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\n"
              "space directions: ({},0,0) (0,{},0) (0,0,{})\nkinds: domain domain domain\nendian: little\n"
              "encoding: gzip\nspace origin: ({},{},{})\n\n",
-             grid.size.x(), grid.size.y(), grid.size.z(), step.x(), step.y(), step.z(), grid.origin_mm.x(),
+             type, grid.size.x(), grid.size.y(), grid.size.z(), step.x(), step.y(), step.z(), grid.origin_mm.x(),
              grid.origin_mm.y(), grid.origin_mm.z()) +
-         gzipped(labels.voxels);
+         gzipped(bytes);
 }
 
 std::string ply_text(const reconstruction::Surface& surface) {
@@ -123,13 +124,58 @@ std::string ply_text(const reconstruction::Surface& surface) {
   return text;
 }
 
+std::string series_case_text(const std::string& name, Series series) {
+  return fmt::format(R"([case]
+name = "{}"
+frame = "LPS"
+side = "both"
+
+[image]
+file = "mri.nrrd"
+kind = "mri"
+[image.labels]                     # of the answer, for supine-segment --truth
+air = [0, 7]
+adipose = [1]
+gland = [2]
+skin = [3]
+muscle = [4]
+excluded = [5]
+vessel = [6]
+
+[segmentation]
+recipe = "{}"
+
+[pose.prone]
+gravity = [0.0, -1.0, 0.0]
+[pose.supine]
+gravity = [0.0, 1.0, 0.0]
+)",
+                     name, series == Series::t1 ? "t1_auto" : "fatsat_auto");
+}
+
 }  // namespace
+
+void write_series_folder(const fs::path& folder, const fs::path& truth, const MadeSeries& made, Series series,
+                         Outputs& outputs) {
+  const std::string name = fs::absolute(folder).lexically_normal().filename().string();
+  write_text(series_case_text(name, series), folder / "case.toml", outputs);
+  write_text(model_text, folder / "model.toml", outputs);
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(2 * made.image.voxels.size());
+  for (const float grey : made.image.voxels) {
+    const auto whole = static_cast<std::uint16_t>(std::clamp(grey, 0.0f, 65535.0f));
+    bytes.push_back(static_cast<std::uint8_t>(whole & 0xff));
+    bytes.push_back(static_cast<std::uint8_t>(whole >> 8));
+  }
+  write_text(nrrd_text(made.image.grid, "uint16", bytes), folder / "mri.nrrd", outputs);
+  write_text(nrrd_text(made.truth.grid, "uint8", made.truth.voxels), truth, outputs);
+}
 
 void write_case_folder(const fs::path& folder, const CaseContents& contents, Outputs& outputs) {
   const std::string name = fs::absolute(folder).lexically_normal().filename().string();
   write_text(case_text(name, contents), folder / "case.toml", outputs);
   write_text(model_text, folder / "model.toml", outputs);
-  write_text(nrrd_text(contents.labels), folder / "labels.nrrd", outputs);
+  write_text(nrrd_text(contents.labels.grid, "uint8", contents.labels.voxels), folder / "labels.nrrd", outputs);
   write_landmarks(contents.prone_landmarks, outputs.stage(folder / "prone_landmarks.csv"));
   for (const MeasuredPose& pose : contents.poses) {
     write_text(ply_text(pose.scan.surface), folder / (pose.name + ".ply"), outputs);

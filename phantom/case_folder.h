@@ -6,6 +6,7 @@
 
 #include "common/landmarks.h"
 #include "common/outputs.h"
+#include "phantom/mri/series.h"
 #include "phantom/scan.h"
 #include "segmentation/image.h"
 
@@ -31,5 +32,12 @@ struct CaseContents {
 /// Bytes depend on the contents and the folder's name alone: no time, no provenance.
 /// @throws InputError  what Outputs says
 void write_case_folder(const std::filesystem::path& folder, const CaseContents& contents, Outputs& outputs);
+
+/// Writes a made series as a case: mri.nrrd (uint16), case.toml with the automatic recipe of its kind, model.toml; and
+/// apart from it the truth, a label volume on the same grid whose values are those of Stuff and of the case's
+/// [image.labels].
+/// @param truth  .nrrd
+void write_series_folder(const std::filesystem::path& folder, const std::filesystem::path& truth,
+                         const MadeSeries& made, Series series, Outputs& outputs);
 
 }  // namespace supine::phantom

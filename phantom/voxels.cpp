@@ -98,7 +98,8 @@ meshing::TriangleTree tree_of(const Points& points, const FaceGrid& surface, Reg
 
 /// The boundary in its prone shape, ready to be asked.
 struct Boundary {
-  meshing::TriangleTree skin, cut, not_skin;
+  meshing::TriangleTree skin, cut, inner, not_skin;
+  bool comes_off;  ///< whether the inner surface lies further off the muscle than gap_mm anywhere
 };
 
 bool behind_wall(const Boundary& boundary, const meshing::MuscleDistance& muscle, const Eigen::Vector3d& p,
@@ -112,14 +113,34 @@ bool behind_wall(const Boundary& boundary, const meshing::MuscleDistance& muscle
   return height <= muscle.value(wall.point) + 0.5 + wall.squared_mm2 / 200;
 }
 
+/// Between tissue that hangs off the muscle and the muscle.
+bool under_tissue(const Boundary& boundary, const meshing::MuscleDistance& muscle, const Eigen::Vector3d& p,
+                  double height) {
+  if (!boundary.comes_off) return false;
+  const auto inner = boundary.inner.closest(p);
+  if (muscle.value(inner.point) <= height) return false;
+  const double nearer_than = std::sqrt(inner.squared_mm2 + 1e-6);
+  return boundary.skin.closest(p, nearer_than).triangle < 0 && boundary.cut.closest(p, nearer_than).triangle < 0;
+}
+
 Label outside_label(const Boundary& boundary, const meshing::MuscleDistance& muscle, const Eigen::Vector3d& p,
                     bool under_body) {
   const double height = muscle.value(p);
   if (height < -muscle_mm) return Label::air;
   if (height <= 0) return Label::muscle;
   if (behind_wall(boundary, muscle, p, height)) return Label::excluded;
-  // What is left between tissue and muscle where the breast has come off by less than a voxel.
-  return under_body && height < gap_mm ? Label::muscle : Label::air;
+  // What is left between tissue and muscle where the breast has come off.
+  const bool gap = under_body && (height < gap_mm || under_tissue(boundary, muscle, p, height));
+  return gap ? Label::muscle : Label::air;
+}
+
+bool comes_off(const Points& points, const FaceGrid& surface, const meshing::MuscleDistance& muscle) {
+  for (int t = 0; t < surface.region().size(); ++t) {
+    if (surface.region()[t] != static_cast<int>(Region::inner)) continue;
+    for (const int corner : surface.triangles().row(t))
+      if (muscle.value(points.row(corner).transpose()) > gap_mm) return true;
+  }
+  return false;
 }
 
 /// Voxels of the body as the labels have it: grown or shrunk at the skin.
@@ -192,7 +213,8 @@ LabelImage label_voxels(const BodyMesh& body_mesh, const Body& body, const Point
   const FaceGrid surface(body_mesh.mesh, faces_with(body_mesh.mesh, 0), steps);
   const Points points = surface.at(prone);
   const Boundary boundary{tree_of(points, surface, Region::skin, true), tree_of(points, surface, Region::cut, true),
-                          tree_of(points, surface, Region::skin, false)};
+                          tree_of(points, surface, Region::inner, true), tree_of(points, surface, Region::skin, false),
+                          comes_off(points, surface, *body_mesh.anatomy.muscle)};
   LabelImage labels;
   labels.grid = grid_around(points, options.voxel_mm, random);
   labels.voxels.assign(labels.grid.count(), 0);

@@ -15,8 +15,9 @@ struct VoxelOptions {
 };
 
 /// Labels of the body in its prone shape: a voxel is inside where its centre is. Skin is what lies within its 1.5 mm;
-/// muscle goes 14 mm behind the inner surface; excluded goes on 12 mm behind the wall at the rim. The grid's axes are
-/// the patient's, its origin is off the body by a drawn part of a voxel.
+/// muscle goes from the inner surface, also where that hangs off the muscle, to 14 mm behind the muscle's face;
+/// excluded goes on 12 mm behind the wall at the rim. The grid's axes are the patient's, its origin is off the body by
+/// a drawn part of a voxel.
 segmentation::LabelImage label_voxels(const BodyMesh& body_mesh, const Body& body, const Points& prone,
                                       std::uint64_t seed, const VoxelOptions& options);
 

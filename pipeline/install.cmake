@@ -1,31 +1,31 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
-# cmake --install: tools, libraries, headers, the pipeline's makefile, and find_package(supine) for other projects
+# cmake --install: tools, what drives them, libraries, headers, and find_package(supine) for other projects
 # (samples/own_effect).
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(supine_libraries supine_options supine_common)
-foreach(folder segmentation reconstruction meshing simulation calibration registration diagnosis pipeline picture)
+foreach(folder segmentation reconstruction meshing simulation calibration registration diagnosis warp pipeline picture)
   if(TARGET supine_${folder})
     list(APPEND supine_libraries supine_${folder})
   endif()
 endforeach()
 set(supine_commands simulate compare model calibrate sensitivity diagnose)
-set(supine_plain_tools segment reconstruct decimate tetrahedralise phantom register report)
+set(supine_plain_tools segment reconstruct decimate tetrahedralise phantom register warp report cohort)
 
-install(TARGETS ${supine_libraries} EXPORT supine ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/supine)
-install(EXPORT supine NAMESPACE supine:: FILE supineTargets.cmake DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supine)
+install(TARGETS ${supine_libraries} EXPORT supine ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/supine COMPONENT dev)
+install(EXPORT supine NAMESPACE supine:: FILE supineTargets.cmake DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supine COMPONENT dev)
 foreach(command ${supine_commands} ${supine_plain_tools})
   if(TARGET supine-${command})
-    install(TARGETS supine-${command} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+    install(TARGETS supine-${command} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
   endif()
 endforeach()
-foreach(folder common segmentation reconstruction meshing simulation calibration registration diagnosis phantom pipeline)
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/supine FILES_MATCHING PATTERN *.h)
+foreach(folder common segmentation reconstruction meshing simulation calibration registration diagnosis warp phantom pipeline)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/supine COMPONENT dev FILES_MATCHING PATTERN *.h)
 endforeach()
 # Tools that know the catalogue are built again by a project that adds to it.
 foreach(command ${supine_commands})
-  install(FILES ${PROJECT_SOURCE_DIR}/pipeline/commands/${command}.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/supine/commands)
+  install(FILES ${PROJECT_SOURCE_DIR}/pipeline/commands/${command}.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/supine/commands COMPONENT dev)
 endforeach()
 
 list(JOIN supine_vtk_components " " supine_vtk_list)
@@ -34,4 +34,6 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/pipeline/supineConfig.cmake.
   PATH_VARS CMAKE_INSTALL_BINDIR CMAKE_INSTALL_DATADIR)
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/supineConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/supineConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/supineConfigVersion.cmake
-  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supine)
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supine COMPONENT dev)
+
+include(${CMAKE_CURRENT_LIST_DIR}/package.cmake)

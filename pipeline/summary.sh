@@ -4,6 +4,7 @@
 # Only the comparisons named are shown: others in the folder are left over from an earlier case file.
 set -euo pipefail
 out=${1:?which output folder?}
+imaged=${IMAGED:-prone} predicted=${PREDICTED:-supine} # names of the poses
 shift
 
 # figure FILE JQ-EXPRESSION: the value, "-" when the file or the key is not there.
@@ -27,10 +28,16 @@ fi
 row "triangles, reconstructed" "" %d "$(figure breast.json .triangles)"
 row "triangles, decimated" "" %d "$(figure coarse.json .triangles)"
 row "tetrahedra" "" %d "$(figure mesh.json .cells)"
-row "sag, undeformed to prone, most" mm %.2f "$(figure prone.json .displacement_from_undeformed_mm.max)"
-row "sag, undeformed to supine, most" mm %.2f "$(figure supine.json .displacement_from_undeformed_mm.max)"
-row "way from prone to supine, most" mm %.2f "$(figure supine.json .displacement_from_prone_mm.max)"
-row "round trip to the imaged shape" mm %.1e "$(figure supine.json .round_trip_max_mm)"
+if [ "$imaged" != undeformed ]; then
+  row "sag, undeformed to $imaged, most" mm %.2f "$(figure "$imaged.json" .displacement_from_undeformed_mm.max)"
+fi
+row "sag, undeformed to $predicted, most" mm %.2f "$(figure "$predicted.json" .displacement_from_undeformed_mm.max)"
+if [ "$imaged" != undeformed ]; then
+  row "way from $imaged to $predicted, most" mm %.2f "$(figure "$predicted.json" .displacement_from_prone_mm.max)"
+  row "round trip to the imaged shape" mm %.1e "$(figure "$predicted.json" .round_trip_max_mm)"
+else
+  echo "  imaged free of load: no inverse, no round trip"
+fi
 if [[ " $* " == *"/comparison.vtp "* ]] && [ -f "$out/comparison.json" ]; then
   row "MAE, model to scan (the study's)" mm %.2f "$(figure comparison.json .mae_study_mm)"
   row "MAE, scan to model" mm %.2f "$(figure comparison.json .mae_mm)"
@@ -45,7 +52,7 @@ for comparison in "$@"; do
 done
 echo
 echo "For ParaView, in $out:"
-for file in labels.vti breast.vtp muscle.vtp coarse.vtp mesh.vtu prone.vtu undeformed.vtu supine.vtu \
+for file in labels.vti breast.vtp muscle.vtp coarse.vtp mesh.vtu "${imaged/undeformed/-}.vtu" undeformed.vtu "$predicted.vtu" \
   prone_tumour.vtp supine_tumour.vtp; do
   if [ -f "$out/$file" ]; then printf '  %s\n' "$file"; fi
 done

@@ -132,7 +132,8 @@ void require_tissues(const LabelImage& image) {
         "[image.labels] of case.toml");
 }
 
-// The faces of one region, turned round, as a surface of their own.
+}  // namespace
+
 Surface reversed_region(const Surface& surface, Region region) {
   Surface sheet;
   std::vector<int> renumbered(surface.points.rows(), -1);
@@ -154,8 +155,6 @@ Surface reversed_region(const Surface& surface, Region region) {
   sheet.points.conservativeResize(points, 3);
   return sheet;
 }
-
-}  // namespace
 
 void ReconstructOptions::check() const {
   if (smooth_mm && !(*smooth_mm >= 0)) throw InputError(fmt::format("smooth_mm is {}; it must be >= 0", *smooth_mm));

@@ -48,6 +48,9 @@ struct Reconstruction {
   std::vector<OrganSurface> organs;  ///< gland, tumour, nipple and vessel, as far as there are any
 };
 
+/// The faces of one region, turned round, as a surface of their own.
+Surface reversed_region(const Surface& surface, Region region);
+
 /// Makes the surfaces of a label volume.
 ///
 /// Marching cubes on the labels, regions from the voxel beyond, fairing within half a voxel (see fair()), and a normal

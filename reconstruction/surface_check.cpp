@@ -107,7 +107,9 @@ SurfaceReport check_surface(const Surface& surface) {
   for (Eigen::Index t = 0; t < report.triangles; ++t) {
     const double area = triangle_area(surface, t);
     report.area_mm2 += area;
-    report.region_area_mm2[surface.region.size() > 0 ? surface.region(t) : 0] += area;
+    // Smooth pieces of a body from CAD go through here as regions of their own, with numbers beyond those of Region.
+    const int region = surface.region.size() > 0 ? surface.region(t) : 0;
+    if (region >= 0 && region < static_cast<int>(region_names.size())) report.region_area_mm2[region] += area;
   }
   const std::vector<double> volumes = component_volumes(surface, components_of(edges, report.triangles));
   report.components = static_cast<int>(volumes.size());

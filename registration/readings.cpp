@@ -102,23 +102,11 @@ void check_by_extent(const Problem& problem, const std::string& name) {
                   name, diagonal(problem.points), diagonal(body.points()), least, most));
 }
 
-std::string words_for(const Eigen::Matrix3d& change) {
-  constexpr const char* axes[] = {"x", "y", "z"};
-  std::string negated, order;
-  for (int row = 0; row < 3; ++row) {
-    Eigen::Index column = 0;
-    const double sign = change.row(row).cwiseAbs().maxCoeff(&column) * change(row, column);
-    order += fmt::format("{}{}{}", row > 0 ? ", " : "", change(row, column) < 0 ? "-" : "", axes[column]);
-    if (sign < 0) negated += std::string(negated.empty() ? "" : " and ") + axes[row];
-  }
-  if (change.cwiseAbs().isIdentity()) return negated + (negated == "x and y" ? " negated (RAS)" : " negated");
-  return fmt::format("axes swapped (read its x, y, z as {})", order);
-}
-
 std::string nearest_change(const Eigen::Matrix3d& rotation, bool mirror, double within_deg) {
   const double least_trace = 1 + 2 * std::cos(within_deg * std::acos(-1.0) / 180);
   for (const Eigen::Matrix3d& change : axis_changes(mirror))
-    if ((rotation.transpose() * change).trace() >= least_trace && !change.isIdentity()) return words_for(change);
+    if ((rotation.transpose() * change).trace() >= least_trace && !change.isIdentity())
+      return axis_change_words(change);
   return {};
 }
 
@@ -142,6 +130,19 @@ Problem mirrored_by(Problem problem, const RigidTransform& change) {
 }
 
 }  // namespace
+
+std::string axis_change_words(const Eigen::Matrix3d& change) {
+  constexpr const char* axes[] = {"x", "y", "z"};
+  std::string negated, order;
+  for (int row = 0; row < 3; ++row) {
+    Eigen::Index column = 0;
+    const double sign = change.row(row).cwiseAbs().maxCoeff(&column) * change(row, column);
+    order += fmt::format("{}{}{}", row > 0 ? ", " : "", change(row, column) < 0 ? "-" : "", axes[column]);
+    if (sign < 0) negated += std::string(negated.empty() ? "" : " and ") + axes[row];
+  }
+  if (change.cwiseAbs().isIdentity()) return negated + (negated == "x and y" ? " negated (RAS)" : " negated");
+  return fmt::format("axes swapped (read its x, y, z as {})", order);
+}
 
 void check_unit(const Problem& problem, const std::string& name) {
   if (problem.points.rows() == 0) throw InputError(fmt::format("{}: has no points", name));

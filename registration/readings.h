@@ -21,6 +21,9 @@ void check_unit(const Problem& problem, const std::string& name);
 /// @throws InputError
 void check_mirror(const Problem& problem, const RigidTransform& placement, double score_mm, const std::string& name);
 
+/// What a change of axes (of axis_changes()) does: "x and y negated (RAS)", "axes swapped (read its x, y, z as …)".
+std::string axis_change_words(const Eigen::Matrix3d& change);
+
 /// "x and y negated (RAS)" and the like where the turn is within 15° of a change of axes other than none; else empty.
 std::string named_axis_change(const Eigen::Matrix3d& rotation);
 

@@ -92,7 +92,7 @@ std::vector<BaseParameter> law_rows() {
 std::vector<BaseParameter> density_rows() {
   return {base<&Model::breast, &Breast::density_kg_m3>({.name = "breast.density_kg_m3",
                                                         .unit = "kg/m3",
-                                                        .lower = 1,
+                                                        .lower = 100,
                                                         .upper = 5000,
                                                         .spread = 0.05,
                                                         .one_sided = true,
@@ -110,7 +110,7 @@ std::vector<BaseParameter> skin_rows() {
                                                     .meaning = "Young's modulus of the skin; 0 = no skin membrane"}),
       base<&Model::skin, &Skin::thickness_mm>({.name = "skin.thickness_mm",
                                                .unit = "mm",
-                                               .lower = 1e-3,
+                                               .lower = 0.05,
                                                .upper = 10,
                                                .spread = 0.3,
                                                .one_sided = true,

@@ -15,11 +15,13 @@
 #include "simulation/effects/left_right_stiffness.h"
 #include "simulation/effects/ligament.h"
 #include "simulation/effects/misregistration.h"
+#include "simulation/effects/part_stiffness.h"
 #include "simulation/effects/segmentation_offset.h"
 #include "simulation/effects/skin_prestretch.h"
 #include "simulation/effects/skin_stiffening.h"
 #include "simulation/effects/stiffness_gradient.h"
 #include "simulation/effects/strain_stiffening.h"
+#include "simulation/effects/support_compliance.h"
 #include "simulation/effects/tissue_stiffness.h"
 
 namespace supine::simulation {
@@ -48,6 +50,8 @@ std::vector<const Effect*>& entries() {
                                                        .spread = 0.7,
                                                        .one_sided = true,
                                                        .meaning = "ln of tumour stiffness over fat stiffness"});
+  static const PartStiffness part_stiffness;
+  static const SupportCompliance support_compliance;
   static const StiffnessGradient stiffness_gradient;
   static const LeftRightStiffness left_right_stiffness;
   static const SkinPrestretch skin_prestretch;
@@ -59,10 +63,26 @@ std::vector<const Effect*>& entries() {
   static const GravityTilt gravity_tilt;
   static const Misregistration misregistration;
   static const SegmentationOffset segmentation_offset;
-  static std::vector<const Effect*> all = {
-      &adhesion, &ligament,     &friction,           &strain_stiffening,    &fibre_anisotropy, &incompressibility,
-      &gland,    &tumour,       &stiffness_gradient, &left_right_stiffness, &skin_prestretch,  &skin_stiffening,
-      &creep,    &arm_traction, &chest_wall_motion,  &gravity_tilt,         &misregistration,  &segmentation_offset};
+  static std::vector<const Effect*> all = {&adhesion,
+                                           &ligament,
+                                           &support_compliance,
+                                           &friction,
+                                           &strain_stiffening,
+                                           &fibre_anisotropy,
+                                           &incompressibility,
+                                           &gland,
+                                           &tumour,
+                                           &part_stiffness,
+                                           &stiffness_gradient,
+                                           &left_right_stiffness,
+                                           &skin_prestretch,
+                                           &skin_stiffening,
+                                           &creep,
+                                           &arm_traction,
+                                           &chest_wall_motion,
+                                           &gravity_tilt,
+                                           &misregistration,
+                                           &segmentation_offset};
   return all;
 }
 

@@ -37,8 +37,9 @@ struct Layout;
 struct Scene {
   const meshing::TetMesh& mesh;  ///< imaged
   const meshing::Anatomy& anatomy;
-  const Layout& layout;  ///< where the fields live
-  std::string pose;      ///< prone, supine, …
+  const Layout& layout;    ///< where the fields live
+  std::string pose;        ///< prone, supine, …
+  bool is_imaged() const;  ///< whether that is the pose the mesh was imaged in
 };
 
 /// What an effect is a cause of. Measurement and numerical causes come before the others where several do equally well.
@@ -56,6 +57,7 @@ struct EffectTraits {
   bool moves_scan = false;
   /// The error of every measurement that looks like this effect, by its name in budgets; empty: there is none.
   std::string error_source = {};
+  bool breast_only = false;         ///< it is about anatomy that an object does not have
   bool error_of_each_scan = false;  ///< that error is another one in each scan: its place, the breath it was taken at
 };
 
@@ -63,7 +65,7 @@ struct EffectTraits {
 struct MeasurementTolerances {
   double registration_mm = 2;        ///< shift of each scan, 1 sigma in each direction
   double registration_rad = 0.0262;  ///< turn of each scan: 1.5°
-  double gravity_rad = 0.0349;       ///< direction of gravity in each pose but prone: 2°
+  double gravity_rad = 0.0349;       ///< direction of gravity in each pose but the imaged one: 2°
   double segmentation_mm = 0.3;      ///< offset of the imaged skin: a fifth of a 1.5 mm voxel
   double chest_wall_mm = 1;          ///< the muscle between two scans: breath, and where its border was drawn
   double incompressibility = 0.3;    ///< of a in ν = 0.5 - (0.5 - ν₀) e^{-a}: ν itself is assumed
@@ -81,6 +83,9 @@ class Effect {
   virtual const std::vector<Parameter>& parameters() const = 0;
   virtual const std::vector<OptionRow>& options() const;
   virtual EffectTraits traits() const { return {}; }
+  /// Whether the body has what the effect is about (breasts, named parts, named supports); where it has not, the
+  /// effect is no candidate and nobody is told of it.
+  virtual bool belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy) const;
   /// How well the measurement is known in what this effect stands for, 1 sigma, in the unit of the parameters that have
   /// @p unit (empty: of its strength); 0 where errors of the measurement do not look like it.
   virtual double tolerance([[maybe_unused]] const std::string& unit,

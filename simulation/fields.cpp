@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "meshing/anatomy.h"
+#include "meshing/supports.h"
 #include "meshing/tet_mesh.h"
 #include "simulation/elements/elements.h"
 #include "simulation/elements/surface_geometry.h"
@@ -35,6 +36,20 @@ Eigen::VectorXi faces_of(const meshing::TetMesh& mesh, std::initializer_list<Reg
   for (int f = 0; f < mesh.faces.rows(); ++f)
     for (const Region region : regions)
       if (mesh.region[f] == static_cast<int>(region)) rows.push_back(f);
+  return Eigen::Map<Eigen::VectorXi>(rows.data(), static_cast<Eigen::Index>(rows.size()));
+}
+
+/// Faces on the supports, those of one support together. @param begin  out: Layout::support_begin
+Eigen::VectorXi faces_on_supports(const meshing::TetMesh& mesh, std::vector<int>& begin) {
+  const Eigen::VectorXi support = meshing::support_of_faces(mesh);
+  const int count = std::max(1, static_cast<int>(mesh.support_names.size()));
+  std::vector<int> rows;
+  begin = {0};
+  for (int s = 0; s < count; ++s) {
+    for (int f = 0; f < support.size(); ++f)
+      if (support[f] == s) rows.push_back(f);
+    begin.push_back(static_cast<int>(rows.size()));
+  }
   return Eigen::Map<Eigen::VectorXi>(rows.data(), static_cast<Eigen::Index>(rows.size()));
 }
 
@@ -89,7 +104,7 @@ template <class Face>
 Layout layout_of(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy) {
   Layout layout;
   layout.skin = face_group<Face>(mesh, anatomy, faces_of(mesh, {Region::skin}));
-  layout.interface = quadrature_group<Face>(mesh, anatomy, faces_of(mesh, {Region::inner, Region::ligament}));
+  layout.interface = quadrature_group<Face>(mesh, anatomy, faces_on_supports(mesh, layout.support_begin));
   layout.cut = quadrature_group<Face>(mesh, anatomy, faces_of(mesh, {Region::cut}));
   layout.skin_offset_once = std::make_shared<SkinOffsetOnce>();
   layout.cell_q.resize(mesh.cells.rows(), 2);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <vector>
 
 #include "common/arrays.h"
 #include "simulation/effect.h"
@@ -90,11 +91,12 @@ struct FaceGroup {
 class SkinOffsetOnce;
 
 struct Layout {
-  FaceGroup skin;               ///< one point per face: its centroid
-  FaceGroup interface;          ///< inner and ligament regions, quadrature points
-  FaceGroup cut;                ///< quadrature points
-  Table cell_q;                 ///< #cells by 2, anatomy coordinates of cell centroids
-  Eigen::VectorXi cell_breast;  ///< #cells; row of Anatomy::breasts, 0 where there is one breast only
+  FaceGroup skin;                  ///< one point per face: its centroid
+  FaceGroup interface;             ///< inner and ligament regions, quadrature points; faces of one support together
+  std::vector<int> support_begin;  ///< #supports + 1; the first of each support's faces in interface.faces, and the end
+  FaceGroup cut;                   ///< quadrature points
+  Table cell_q;                    ///< #cells by 2, anatomy coordinates of cell centroids
+  Eigen::VectorXi cell_breast;     ///< #cells; row of Anatomy::breasts, 0 where there is one breast only
 
   /// skin_offset() of the scene's mesh, which must be the layout's own; found when first asked for, then kept. Threads
   /// may ask at the same time.

@@ -1,14 +1,21 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/mechanics.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "common/error.h"
+#include "common/suggestion.h"
 #include "simulation/elements/tet_geometry.h"
+#include "simulation/model_fields.h"
 #include "simulation/terms/bulk.h"
 #include "simulation/terms/cut.h"
 #include "simulation/terms/fibres.h"
 #include "simulation/terms/gravity.h"
 #include "simulation/terms/interface.h"
 #include "simulation/terms/skin.h"
+#include "simulation/terms/support.h"
 #include "simulation/terms/traction.h"
 
 namespace supine::simulation {
@@ -32,9 +39,15 @@ std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, cons
     terms.push_back(std::make_unique<SkinTerm<MembraneFace<Face>>>(
         rows_of(mesh.faces, layout.skin.faces), pattern, SkinSettings{model.skin.law, model.skin.compression}));
   terms.push_back(std::make_unique<TractionTerm<Face>>(rows_of(mesh.faces, layout.skin.faces), pattern));
-  if (model.interface.kind == InterfaceKind::sliding)
-    terms.push_back(
-        std::make_unique<InterfaceTerm<Face>>(rows_of(mesh.faces, layout.interface.faces), pattern, anatomy.muscle));
+  for (std::size_t s = 0; s < layout.support_begin.size() - 1; ++s) {
+    const int first = layout.support_begin[s], count = layout.support_begin[s + 1] - first;
+    const Indices faces = rows_of(mesh.faces, layout.interface.faces.segment(first, count));
+    const InterfaceKind kind = kind_of_support(model, mesh, static_cast<int>(s));
+    if (kind == InterfaceKind::sliding)
+      terms.push_back(std::make_unique<InterfaceTerm<Face>>(faces, pattern, anatomy.support(s), first * Face::points));
+    else if (is_tied(kind, mesh))
+      terms.push_back(std::make_unique<SupportTerm<Face>>(faces, pattern, mesh.points, first * Face::points));
+  }
   if (model.cut.kind == CutKind::elastic)
     terms.push_back(std::make_unique<CutTerm<Face>>(rows_of(mesh.faces, layout.cut.faces), pattern));
   return terms;
@@ -76,7 +89,14 @@ double volume_of(const Indices& cells, const Points& x) {
 Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model)
     : mesh_(mesh), anatomy_(anatomy), layout_(make_layout(mesh, anatomy)), held_(mesh.points.rows(), 0) {
   if (layout_.interface.faces.size() == 0)
-    throw InputError("the mesh has no inner faces: nothing lies on the muscle, so nothing holds the breast");
+    throw InputError(anatomy.is_object()
+                         ? "the mesh has no inner faces: no support holds the body"
+                         : "the mesh has no inner faces: nothing lies on the muscle, so nothing holds the breast");
+  for (const auto& [name, own] : model.supports)
+    if (std::find(mesh.support_names.begin(), mesh.support_names.end(), name) == mesh.support_names.end())
+      throw InputError(
+          fmt::format("[supports.{}] of the model is no support of this body; {}", name,
+                      mesh.support_names.empty() ? "it has none with a name" : suggestion(name, mesh.support_names)));
   pattern_ = std::make_unique<Pattern>(mesh.cells, mesh.points.rows());
   terms_ = mesh.order() == 2 ? make_terms<Tet10, Tri6>(mesh, anatomy, model, layout_, *pattern_)
                              : make_terms<Tet4, Tri3>(mesh, anatomy, model, layout_, *pattern_);
@@ -86,7 +106,7 @@ Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anato
       for (const int node : mesh.faces.row(face)) held_[node] = 1;
     any_held_ = true;
   };
-  if (model.interface.kind == InterfaceKind::fixed) hold_group(layout_.interface);
+  if (model.interface.kind == InterfaceKind::fixed && mesh.support_names.empty()) hold_group(layout_.interface);
   if (model.cut.kind == CutKind::held) hold_group(layout_.cut);
 }
 

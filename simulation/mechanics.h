@@ -12,7 +12,8 @@
 namespace supine::simulation {
 
 /// The terms of one model on one mesh, summed: r(x, X) and its derivatives.
-/// Nodes that the model holds (interface.kind = fixed, cut.kind = held) keep x = X = imaged place.
+/// Nodes that the model holds (interface.kind = fixed on the muscle, cut.kind = held) keep x = X = imaged place. Named
+/// supports that are fixed are held by springs of fixed_support_kpa_per_mm (model_fields.h), so that they can give way.
 class Mechanics {
  public:
   /// @param mesh, anatomy  of the imaged shape; must outlive the object

@@ -26,7 +26,7 @@ enum class BulkLaw { SUPINE_INVARIANT_LAWS(SUPINE_NAME) corotational, corotation
 enum class Volumetric { mean, pointwise };
 enum class SkinLaw { neo_hookean, corotational };
 enum class Compression { tension_field, full };
-enum class InterfaceKind { sliding, fixed };
+enum class InterfaceKind { sliding, elastic, fixed };
 enum class CutKind { elastic, held };
 enum class DensityReference { imaged, undeformed };
 
@@ -35,6 +35,12 @@ struct EffectSetting {
   std::string name;
   std::map<std::string, Setting> parameters;
   std::map<std::string, std::string> options;
+};
+
+/// How tissue is held on one support of an object; what is absent is that of [interface].
+struct SupportSetting {
+  std::optional<InterfaceKind> kind;
+  std::optional<double> normal_kpa_per_mm, tangential_kpa_per_mm;
 };
 
 /// model.toml: what is believed. Units in the names; moduli are Young's. Every Setting of the base model has a row in
@@ -69,6 +75,7 @@ struct Model {
     CutKind kind = CutKind::elastic;
     Setting stiffness_kpa_per_mm{1.0};
   } cut;
+  std::map<std::string, SupportSetting> supports;  ///< by name, as the mesh has them
   std::vector<EffectSetting> effects;
   /// What differs from pose to pose, by the pose's name: where its scan lies, how gravity falls in it. Acts after the
   /// effects and on top of them; no parameter stands for its numbers.

@@ -13,6 +13,25 @@
 namespace supine::simulation {
 namespace {
 
+/// Stiffness of the springs under each support: of the model's interface, of its own, or of what is fixed.
+void set_supports(const Model& model, const Scene& scene, Fields<Dual>& fields) {
+  if (scene.mesh.support_names.empty()) return;
+  const std::vector<int>& begin = scene.layout.support_begin;
+  const Eigen::Index points = fields.interface_normal.size() / std::max(1, begin.back());
+  for (std::size_t s = 0; s + 1 < begin.size(); ++s) {
+    const Eigen::Index first = points * begin[s], count = points * (begin[s + 1] - begin[s]);
+    auto normal = fields.interface_normal.segment(first, count);
+    auto tangential = fields.interface_tangential.segment(first, count);
+    if (kind_of_support(model, scene.mesh, static_cast<int>(s)) == InterfaceKind::fixed) {
+      normal.setConstant(Dual(fixed_support_kpa_per_mm));
+      tangential.setConstant(Dual(fixed_support_kpa_per_mm));
+    } else if (const auto own = model.supports.find(scene.mesh.support_names[s]); own != model.supports.end()) {
+      if (own->second.normal_kpa_per_mm) normal.setConstant(Dual(*own->second.normal_kpa_per_mm));
+      if (own->second.tangential_kpa_per_mm) tangential.setConstant(Dual(*own->second.tangential_kpa_per_mm));
+    }
+  }
+}
+
 Fields<Dual> base_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity,
                          const std::string& varied) {
   const Layout& layout = scene.layout;
@@ -39,6 +58,7 @@ Fields<Dual> base_fields(const Model& model, const Scene& scene, const Eigen::Ve
   fields.skin_prestretch = constant(skin, Dual(1.0));
   fields.interface_normal = constant(contact, number("interface.normal_kpa_per_mm"));
   fields.interface_tangential = constant(contact, number("interface.tangential_kpa_per_mm"));
+  set_supports(model, scene, fields);
   fields.cut_stiffness = constant(layout.cut.q.rows(), number("cut.stiffness_kpa_per_mm"));
   fields.stiffening = fields.fibre_modulus = constant(cells, Dual(0.0));
   fields.skin_stiffening = constant(skin, Dual(0.0));
@@ -75,14 +95,14 @@ EffectSetting with_typical_values(EffectSetting setting) {
   return setting;
 }
 
-/// Names of the columns that the effect, alone and of ordinary size, changes in prone or in the scene's pose.
+/// Names of the columns that the effect, alone and of ordinary size, changes in the imaged pose or in the scene's pose.
 std::vector<std::string> changed_columns(const Model& model, const EffectSetting& setting, const Scene& scene) {
   Model alone = model, without = model;
   alone.effects = {with_typical_values(setting)};
   without.effects.clear();
   const Eigen::Vector3d gravity = Eigen::Vector3d(1, 2, 3).normalized();  // no rotation leaves it as it is
   std::vector<std::string> changed;
-  for (const std::string& pose : {std::string("prone"), scene.pose}) {
+  for (const std::string& pose : {scene.anatomy.imaged_pose, scene.pose}) {
     const Scene place{scene.mesh, scene.anatomy, scene.layout, pose};
     const auto with = values_of(make_fields(alone, place, gravity));
     const auto base = values_of(make_fields(without, place, gravity));
@@ -93,11 +113,11 @@ std::vector<std::string> changed_columns(const Model& model, const EffectSetting
 }
 
 /// Why no force of this model depends on a column, or nullptr where one does.
-const char* why_unread(const Model& model, const std::string& column) {
+const char* why_unread(const Model& model, const Scene& scene, const std::string& column) {
   const auto is = [&column](std::initializer_list<const char*> names) {
     return std::find(names.begin(), names.end(), column) != names.end();
   };
-  if (model.interface.kind == InterfaceKind::fixed &&
+  if (model.interface.kind == InterfaceKind::fixed && scene.mesh.support_names.empty() &&
       is({"interface_normal", "interface_tangential", "interface_friction", "muscle_offset"}))
     return "interface.kind = \"fixed\" holds the whole inner surface; use \"sliding\" or remove the effect";
   if (model.breast.law != BulkLaw::neo_hookean && is({"stiffening"}))
@@ -112,6 +132,16 @@ const char* why_unread(const Model& model, const std::string& column) {
 }
 
 }  // namespace
+
+InterfaceKind kind_of_support(const Model& model, const meshing::TetMesh& mesh, int support) {
+  if (mesh.support_names.empty()) return model.interface.kind;
+  const auto own = model.supports.find(mesh.support_names[static_cast<std::size_t>(support)]);
+  return own == model.supports.end() ? model.interface.kind : own->second.kind.value_or(model.interface.kind);
+}
+
+bool is_tied(InterfaceKind kind, const meshing::TetMesh& mesh) {
+  return kind == InterfaceKind::elastic || (kind == InterfaceKind::fixed && !mesh.support_names.empty());
+}
 
 Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity,
                          const std::string& varied) {
@@ -142,13 +172,18 @@ void check_effects_act(const Model& model, const Scene& scene) {
     const auto refuse = [&setting](const char* reason) {
       throw InputError(fmt::format("effect '{}' cannot change anything here: {}", setting.name, reason));
     };
-    if (scene.pose == "prone" && find_effect(setting.name) != nullptr &&
-        find_effect(setting.name)->traits().acts_in != ActsIn::every_pose)
-      refuse("prone is the only pose and it acts between poses; give the case another one or remove the effect");
+    const Effect* effect = find_effect(setting.name);
+    if (scene.is_imaged() && effect != nullptr && effect->traits().acts_in != ActsIn::every_pose)
+      refuse(
+          (scene.pose + " is the only pose and it acts between poses; give the case another one or remove the effect")
+              .c_str());
+    if (effect != nullptr && !effect->belongs_to(scene.mesh, scene.anatomy))
+      refuse(
+          "the body has not what it is about (a breast's anatomy, a named part, a named support); remove the effect");
     const char* unread = nullptr;
     bool acts = false;
     for (const std::string& column : changed_columns(model, setting, scene)) {
-      const char* reason = why_unread(model, column);
+      const char* reason = why_unread(model, scene, column);
       acts = acts || reason == nullptr;
       if (unread == nullptr) unread = reason;
     }

@@ -97,7 +97,7 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
     base.errors += doubt * doubt.transpose() + coarser * coarser.transpose();
   }
   base.kernel =
-      discrepancy_kernel(*evaluator.scene().mesh, sensitivities, base.fit.prediction, residuals, base.clusters);
+      discrepancy_of(*evaluator.scene().mesh, sensitivities, base.fit.prediction, residuals, base.clusters).kernel;
   base.scale_mm = std::max(priors.least_unexplained_mm, priors.share_of_way * way_mm(base.fit.prediction.solution));
   base.most_mm = priors.most_unexplained_mm;
   base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);

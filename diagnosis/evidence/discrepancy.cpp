@@ -14,7 +14,7 @@ namespace {
 using reconstruction::Region;
 
 constexpr int centres_per_surface = 60;
-constexpr double length_mm = 25, share_beyond_forces = 0.1;
+constexpr double length_mm = 25;
 
 /// Faces of the undeformed body with what integrals over them need.
 struct Surface {
@@ -59,37 +59,44 @@ Eigen::VectorXd nodal_forces(const Surface& surface, const Eigen::VectorXd& trac
 
 }  // namespace
 
-Eigen::MatrixXd discrepancy_kernel(const meshing::TetMesh& mesh, const simulation::Sensitivities& sensitivities,
-                                   const calibration::Prediction& prediction, const calibration::Residuals& residuals,
-                                   const calibration::Clusters& clusters) {
-  const Points& X = prediction.solution.X;
-  Eigen::MatrixXd columns(clusters.pose.size(), 0);
+std::vector<Eigen::VectorXd> discrepancy_forces(const meshing::TetMesh& mesh, const Points& X) {
+  std::vector<Eigen::VectorXd> forces;
   for (const auto& regions : {std::vector{Region::skin}, std::vector{Region::inner, Region::ligament}}) {
     const Surface surface = regions.size() == 1 ? surface_of(mesh, X, {Region::skin})
                                                 : surface_of(mesh, X, {Region::inner, Region::ligament});
     if (surface.nodes.rows() == 0) continue;
     const Eigen::MatrixXd traction = tractions(surface);
     for (Eigen::Index c = 0; c < traction.cols(); ++c)
-      for (int axis = 0; axis < 3; ++axis) {
-        const Eigen::VectorXd force = nodal_forces(surface, traction.col(c), axis, X.rows());
-        std::vector<Points> moves;
-        for (std::size_t pose = 0; pose < prediction.poses.size(); ++pose)
-          moves.push_back(sensitivities.moved_by(pose, force));
-        columns.conservativeResize(Eigen::NoChange, columns.cols() + 1);
-        columns.rightCols<1>() = clusters.means(distance_change(prediction, residuals, moves));
-      }
+      for (int axis = 0; axis < 3; ++axis) forces.push_back(nodal_forces(surface, traction.col(c), axis, X.rows()));
   }
-  Eigen::MatrixXd kernel = columns * columns.transpose();
-  for (Eigen::Index i = 0; i < kernel.rows(); ++i)
-    for (Eigen::Index j = 0; j < kernel.cols(); ++j)
-      if (clusters.pose[i] != clusters.pose[j]) kernel(i, j) *= 0.5;
+  return forces;
+}
+
+Discrepancy discrepancy_of(const meshing::TetMesh& mesh, const simulation::Sensitivities& sensitivities,
+                           const calibration::Prediction& prediction, const calibration::Residuals& residuals,
+                           const calibration::Clusters& clusters) {
+  Discrepancy found{discrepancy_forces(mesh, prediction.solution.X), {}, {}};
+  found.columns.resize(clusters.pose.size(), static_cast<Eigen::Index>(found.forces.size()));
+  for (std::size_t f = 0; f < found.forces.size(); ++f) {
+    std::vector<Points> moves;
+    for (std::size_t pose = 0; pose < prediction.poses.size(); ++pose)
+      moves.push_back(sensitivities.moved_by(pose, found.forces[f]));
+    found.columns.col(static_cast<Eigen::Index>(f)) = clusters.means(distance_change(prediction, residuals, moves));
+  }
+  found.kernel = found.columns * found.columns.transpose();
+  for (Eigen::Index i = 0; i < found.kernel.rows(); ++i)
+    for (Eigen::Index j = 0; j < found.kernel.cols(); ++j)
+      if (clusters.pose[i] != clusters.pose[j]) found.kernel(i, j) *= common_to_poses;
   const Eigen::ArrayXd of_skin = (clusters.kind.array() == 0).cast<double>();
-  kernel *= (1 - share_beyond_forces) * of_skin.sum() / of_skin.matrix().dot(kernel.diagonal());
-  const Eigen::MatrixXd plain = gaussian_kernel(clusters.place, clusters.place, length_mm);
-  for (Eigen::Index i = 0; i < kernel.rows(); ++i)
-    for (Eigen::Index j = 0; j < kernel.cols(); ++j)
-      if (clusters.related(i, j)) kernel(i, j) += share_beyond_forces * plain(i, j);
-  return kernel;
+  const double variance = (1 - share_beyond_forces) * of_skin.sum() / of_skin.matrix().dot(found.kernel.diagonal());
+  found.kernel *= variance;
+  found.columns *= std::sqrt(variance);
+  for (Eigen::VectorXd& force : found.forces) force *= std::sqrt(variance);
+  const Eigen::MatrixXd plain = gaussian_kernel(clusters.place, clusters.place, beyond_forces_length_mm);
+  for (Eigen::Index i = 0; i < found.kernel.rows(); ++i)
+    for (Eigen::Index j = 0; j < found.kernel.cols(); ++j)
+      if (clusters.related(i, j)) found.kernel(i, j) += share_beyond_forces * plain(i, j);
+  return found;
 }
 
 }  // namespace supine::diagnosis

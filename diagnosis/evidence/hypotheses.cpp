@@ -44,6 +44,10 @@ double already_said(const BaseFit& base, const std::string& effect) {
   return already;
 }
 
+bool is_part_of(const Hypothesis& part, const Hypothesis& whole) {
+  return std::includes(whole.effects.begin(), whole.effects.end(), part.effects.begin(), part.effects.end());
+}
+
 }  // namespace
 
 int Hypothesis::place_of(const std::string& name) const {
@@ -58,15 +62,19 @@ double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t
 }
 
 void lower_unfollowed(std::vector<Hypothesis>& hypotheses) {
-  double fall = std::numeric_limits<double>::infinity(), nothing = -fall;
+  double least = std::numeric_limits<double>::infinity(), nothing = -least;
   for (const Hypothesis& h : hypotheses) {
-    if (h.refitted) fall = std::min(fall, h.screened - h.ln_evidence);
+    if (h.refitted) least = std::min(least, h.screened - h.ln_evidence);
     if (h.effects.empty()) nothing = h.ln_evidence;
   }
-  if (!std::isfinite(fall)) return;
-  for (Hypothesis& h : hypotheses)
-    if (!h.refitted && !h.effects.empty())
-      h.ln_evidence = std::max(h.screened - std::max(fall, 0.0), std::min(h.screened, nothing));
+  if (!std::isfinite(least)) return;
+  for (Hypothesis& h : hypotheses) {
+    if (h.refitted || h.effects.empty()) continue;
+    double fall = std::max(least, 0.0);
+    for (const Hypothesis& part : hypotheses)
+      if (part.refitted && is_part_of(part, h)) fall = std::max(fall, part.screened - part.ln_evidence);
+    h.ln_evidence = std::max(h.screened - fall, std::min(h.screened, nothing));
+  }
 }
 
 void normalise(std::vector<Hypothesis>& hypotheses) {

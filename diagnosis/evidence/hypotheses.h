@@ -50,8 +50,9 @@ class Screening {
 /// ln of the prior of one set of @p size out of @p candidates effects.
 double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t size);
 
-/// What was not followed through the chain is lowered by the smallest fall of the evidence that following showed: it
-/// is a gain over nothing that lines may promise too much of, so not below nothing's.
+/// What was not followed through the chain is lowered by the smallest fall of the evidence that following showed, and
+/// by the largest that a part of it showed: where lines promise too much of an effect they do so of every set that
+/// holds it. It is a gain over nothing that they promise, so not below nothing's.
 void lower_unfollowed(std::vector<Hypothesis>& hypotheses);
 
 /// Fills the probabilities and puts the most probable first.

@@ -33,7 +33,7 @@ void add_of_effect(const Effect& effect, const std::vector<std::string>& poses, 
     };
     if (!traits.error_of_each_scan) add({}, priors.known);
     for (const std::string& pose : poses)
-      if (traits.error_of_each_scan && pose != "prone") add(pose, priors.known_in(pose));
+      if (traits.error_of_each_scan && pose != poses.front()) add(pose, priors.known_in(pose));
   }
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/evidence/patchiness.h"
 
+#include <memory>
+
 #include "diagnosis/evidence/field_modes.h"
 #include "meshing/topology.h"
 
@@ -56,30 +58,35 @@ PatchyFields patchy_fields(const simulation::Mechanics& mechanics, const Patchin
           muscle_fields(mechanics.anatomy(), mechanics.layout(), size)};
 }
 
+std::vector<simulation::Sensitivities::FieldDirection> patchy_directions(const simulation::Chain& chain,
+                                                                         const Patchiness& size) {
+  const auto fields = std::make_shared<const PatchyFields>(patchy_fields(chain.mechanics(), size));
+  std::vector<simulation::Sensitivities::FieldDirection> all;
+  for (Eigen::Index k = 0; k < fields->tissue.cols(); ++k)
+    all.emplace_back([fields, k](const PoseLoad&, Fields<Dual>& f) {
+      for (Eigen::Index c = 0; c < f.ln_young.size(); ++c) f.ln_young[c].v[0] = fields->tissue(c, k);
+    });
+  for (Eigen::Index k = 0; k < fields->skin.cols(); ++k)
+    all.emplace_back([fields, k](const PoseLoad&, Fields<Dual>& f) {
+      for (Eigen::Index c = 0; c < f.skin_modulus.size(); ++c)
+        f.skin_modulus[c].v[0] = f.skin_modulus[c].a * fields->skin(c, k);
+    });
+  for (Eigen::Index k = 0; k < fields->muscle.cols(); ++k)
+    all.emplace_back([fields, k, &chain](const PoseLoad& pose, Fields<Dual>& f) {
+      if (pose.name == chain.poses()[0].name) return;
+      for (Eigen::Index c = 0; c < f.muscle_offset.size(); ++c) f.muscle_offset[c].v[0] = fields->muscle(c, k);
+    });
+  return all;
+}
+
 Eigen::MatrixXd patchiness_shapes(const simulation::Chain& chain, const simulation::Sensitivities& sensitivities,
                                   const calibration::Prediction& prediction, const calibration::Residuals& residuals,
                                   const Patchiness& size) {
-  const PatchyFields fields = patchy_fields(chain.mechanics(), size);
-  const Eigen::MatrixXd &tissue = fields.tissue, &skin = fields.skin, &muscle = fields.muscle;
-  Eigen::MatrixXd shapes(residuals.size(), tissue.cols() + skin.cols() + muscle.cols());
-  Eigen::Index column = 0;
-  const auto add = [&](const simulation::Sensitivities::FieldDirection& direction) {
-    shapes.col(column++) = distance_change(prediction, residuals, sensitivities.along(direction).poses);
-  };
-  for (Eigen::Index k = 0; k < tissue.cols(); ++k)
-    add([&](const PoseLoad&, Fields<Dual>& f) {
-      for (Eigen::Index c = 0; c < f.ln_young.size(); ++c) f.ln_young[c].v[0] = tissue(c, k);
-    });
-  for (Eigen::Index k = 0; k < skin.cols(); ++k)
-    add([&](const PoseLoad&, Fields<Dual>& f) {
-      for (Eigen::Index c = 0; c < f.skin_modulus.size(); ++c)
-        f.skin_modulus[c].v[0] = f.skin_modulus[c].a * skin(c, k);
-    });
-  for (Eigen::Index k = 0; k < muscle.cols(); ++k)
-    add([&](const PoseLoad& pose, Fields<Dual>& f) {
-      if (pose.name == chain.poses()[0].name) return;
-      for (Eigen::Index c = 0; c < f.muscle_offset.size(); ++c) f.muscle_offset[c].v[0] = muscle(c, k);
-    });
+  const auto directions = patchy_directions(chain, size);
+  Eigen::MatrixXd shapes(residuals.size(), static_cast<Eigen::Index>(directions.size()));
+  for (std::size_t k = 0; k < directions.size(); ++k)
+    shapes.col(static_cast<Eigen::Index>(k)) =
+        distance_change(prediction, residuals, sensitivities.along(directions[k]).poses);
   return shapes;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <vector>
+
 #include "calibration/evaluator.h"
 #include "calibration/residuals.h"
 #include "simulation/mechanics.h"
@@ -23,6 +25,10 @@ struct PatchyFields {
 };
 
 PatchyFields patchy_fields(const simulation::Mechanics& mechanics, const Patchiness& patchiness);
+
+/// Each shape as a change of the fields of a pose, tissue, then skin, then muscle. @param chain  must outlive them
+std::vector<simulation::Sensitivities::FieldDirection> patchy_directions(const simulation::Chain& chain,
+                                                                         const Patchiness& patchiness);
 
 /// What uneven tissue, uneven skin and a muscle that lies elsewhere do to the distances, to first order: one column per
 /// shape of each field (field_modes.h), #R by 3 × up to 40, mm, each one standard deviation.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "common/error.h"
@@ -10,6 +11,7 @@
 #include "common/statistics.h"
 #include "diagnosis/evidence/fit_errors.h"
 #include "diagnosis/evidence/left_out.h"
+#include "diagnosis/evidence/strength_profile.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
@@ -53,7 +55,10 @@ VectorXd start_of(const FreeParameters& parameters, const BaseFit& base, const s
   return parameters.clamped(u);
 }
 
-std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParameters& parameters) {
+/// Densities of coordinates that are no normal ones.
+using Curved = std::map<Index, CurvedDensity>;
+
+std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParameters& parameters, const Curved& curved) {
   std::vector<FittedParameter> list;
   for (Index i = 0; i < parameters.size(); ++i) {
     const std::string& name = parameters.names()[static_cast<std::size_t>(i)];
@@ -64,7 +69,12 @@ std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParamet
     const auto value = [&](double at) {
       return parameters.value(i, std::clamp(at, parameters.lower()[i], parameters.upper()[i]));
     };
-    list.push_back({name, parameters.unit(i), value(u), value(u - reach), value(u + reach)});
+    const auto at = curved.find(i);
+    if (at == curved.end())
+      list.push_back({name, parameters.unit(i), value(u), value(u - reach), value(u + reach)});
+    else
+      list.push_back({name, parameters.unit(i), value(at->second.quantile(0.5)), value(at->second.quantile(0.025)),
+                      value(at->second.quantile(0.975))});
   }
   return list;
 }
@@ -79,6 +89,36 @@ VectorXd distances_at_posterior(const BaseFit& base, const Hypothesis& h, const 
   VectorXd distance = residuals.distance_mm;
   for (Index r = 0; r < distance.size(); ++r) distance[r] += change[base.clusters.of_point[r]];
   return distance;
+}
+
+/// Fills the hypothesis of a fit: Laplace's evidence at the optimum.
+void weigh_at(const BaseFit& base, const std::vector<Nuisance>& nuisances, const FreeParameters& parameters,
+              Refit& result) {
+  Hypothesis& h = result.hypothesis;
+  h.refitted = true;
+  h.evidence = std::make_shared<LinearEvidence>(*base.covariance, base.distances(result.fit.residuals),
+                                                directions_at(result.fit, parameters, nuisances, base.clusters));
+  h.rows.resize(static_cast<std::size_t>(h.evidence->directions().size()));
+  std::iota(h.rows.begin(), h.rows.end(), 0);
+  h.weighed = h.evidence->weigh(h.rows);
+  h.ln_evidence = h.weighed.ln_evidence;
+}
+
+/// Densities of the strengths whose effects are far from linear, and the evidence corrected by each.
+Curved curved_strengths(const RefitGround& ground, const std::vector<Candidate>& candidates,
+                        const FreeParameters& parameters, Refit& result) {
+  Curved curved;
+  for (const int effect : result.hypothesis.effects) {
+    const Candidate& candidate = candidates[static_cast<std::size_t>(effect)];
+    if (!is_far_from_linear(candidate)) continue;
+    const auto& names = parameters.names();
+    const Index k = std::find(names.begin(), names.end(), candidate.parameters[0].name) - names.begin();
+    auto density = strength_profile(ground, result, parameters, k);
+    if (!density) continue;
+    result.hypothesis.ln_evidence += density->ln_mass() - result.hypothesis.weighed.ln_evidence;
+    curved.emplace(k, std::move(*density));
+  }
+  return curved;
 }
 
 bool is_at_border(const Refit& refit, const FreeParameters& parameters) {
@@ -133,20 +173,15 @@ Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& gi
     return result;  // no equilibrium where the screening has it
   }
   result.solved = true;
-  Hypothesis& h = result.hypothesis;
-  h = screened;
-  h.refitted = true;
-  h.evidence = std::make_shared<LinearEvidence>(*base.covariance, base.distances(result.fit.residuals),
-                                                directions_at(result.fit, parameters, nuisances, base.clusters));
-  h.rows.resize(static_cast<std::size_t>(h.evidence->directions().size()));
-  std::iota(h.rows.begin(), h.rows.end(), 0);
-  h.weighed = h.evidence->weigh(h.rows);
-  h.ln_evidence = h.weighed.ln_evidence;
+  result.hypothesis = screened;
+  weigh_at(base, nuisances, parameters, result);
+  const Curved curved = curved_strengths({scene, base, errors.metric(), nuisances}, candidates, parameters, result);
   result.model = FreeParameters(model).model(result.fit.u);
-  result.parameters = parameters_of(result, parameters);
+  result.parameters = parameters_of(result, parameters, curved);
   result.at_border = is_at_border(result, parameters);
-  result.rms_mm = rms(distances_at_posterior(base, h, result.fit.residuals).head(result.fit.residuals.skin_rows()));
-  result.held_out_rms_mm = held_out_rms(base, h, result.fit.residuals);
+  result.rms_mm =
+      rms(distances_at_posterior(base, result.hypothesis, result.fit.residuals).head(result.fit.residuals.skin_rows()));
+  result.held_out_rms_mm = held_out_rms(base, result.hypothesis, result.fit.residuals);
   return result;
 }
 

@@ -7,6 +7,7 @@
 
 #include "common/error.h"
 #include "meshing/decimate/methods.h"
+#include "meshing/decimate/sharp_patches.h"
 #include "meshing/surface/sound_surface.h"
 
 namespace supine::meshing {
@@ -55,6 +56,21 @@ bool drop_unused_points(const Surface& in, const DecimateOptions& options, Surfa
   return true;
 }
 
+// With the smooth pieces between sharp edges for regions, whose borders are kept.
+DecimateResult decimate_sharp(const Surface& in, DecimateOptions options) {
+  require_sound(in, options.open ? Borders::allowed : Borders::closed, "the surface to decimate");
+  const SharpPatches patches = sharp_patches(in, options.sharp_deg);
+  options.sharp_deg = 0;
+  options.method = DecimateMethod::triangles;
+  DecimateResult result = decimate({in.points, in.triangles, patches.patch}, options);
+  Eigen::VectorXi& region = result.surface.region;
+  if (in.region.size() == 0)
+    region.resize(0);
+  else
+    for (int& row : region) row = patches.region[static_cast<std::size_t>(row)];
+  return result;
+}
+
 }  // namespace
 
 void DecimateOptions::check() const {
@@ -64,6 +80,8 @@ void DecimateOptions::check() const {
     throw InputError(fmt::format("the distance bound is {} mm; it must be > 0", max_distance_mm));
   if (target_faces != 0 && target_faces < 50)
     throw InputError(fmt::format("the number of faces is {}; it must be 0 or at least 50", target_faces));
+  if (sharp_deg != 0 && !(sharp_deg >= 1 && sharp_deg <= 179))
+    throw InputError(fmt::format("the angle of sharp edges is {} degrees; it must lie in [1, 179]", sharp_deg));
   if (!(edge_mm >= 0)) throw InputError(fmt::format("the edge length is {} mm; it must be > 0", edge_mm));
   for (Eigen::Index p = 0; p < relative_size.size(); ++p)
     if (!(relative_size(p) >= smallest_relative && relative_size(p) <= largest_relative))
@@ -73,6 +91,7 @@ void DecimateOptions::check() const {
 
 DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
   options.check();
+  if (options.sharp_deg > 0) return decimate_sharp(in, options);
   SoundSurface sound = require_sound(in, options.open ? Borders::allowed : Borders::closed, "the surface to decimate");
   if (options.relative_size.size() != 0 && options.relative_size.size() != in.points.rows())
     throw InputError(fmt::format("there are {} relative sizes for {} points of the surface; one each is needed",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "reconstruction/surface.h"
@@ -21,7 +22,12 @@ struct DecimateOptions {
   DecimateMethod method = DecimateMethod::quads;
   /// Wanted edge length by point of the input, as a factor of the common one, in [0.05, 20]; empty = 1 everywhere.
   Eigen::VectorXd relative_size = {};
+  /// Edges at which faces meet at more than this stay where they are (CAD bodies), degrees, in [1, 179]; triangles are
+  /// then of one size. 0 = none is kept for its own sake.
+  double sharp_deg = 0;
   bool open = false;  ///< open borders are allowed, and kept as chains of edges
+  /// Called before each attempt with a line that says which; may be empty.
+  std::function<void(const std::string&)> progress = {};
 
   void check() const;  ///< @throws InputError naming option, value and bound
 };

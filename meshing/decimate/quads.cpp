@@ -56,6 +56,9 @@ DecimateResult decimate_to_quads(const DecimateMeasure& measure, const DecimateO
   QuadRemesher remesher(in, options.relative_size, edge_mm, measure.tree());
   DecimateResult failed;
   for (int round = 0; round < most_rounds; ++round) {
+    if (options.progress)
+      options.progress(fmt::format("quads, attempt {} of at most {}{}", round + 1, most_rounds,
+                                   failed.reason.empty() ? "" : "; the last one: " + failed.reason));
     QuadMesh mesh = remesher.make(target);
     measure.give_volume_back(mesh.surface);
     std::vector<Eigen::Vector3d> places = measure.unsound_places(mesh.surface);

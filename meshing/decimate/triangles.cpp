@@ -72,6 +72,9 @@ DecimateResult decimate_to_triangles(const DecimateMeasure& measure, const Decim
   if (in.triangles.rows() > 2 * start_triangles) start = remesh(in, start_share * edge_mm, {}, 1);
   DecimateResult best;
   for (int attempt = 0; attempt < most_tries; ++attempt) {
+    if (options.progress)
+      options.progress(
+          fmt::format("triangles, attempt {} of at most {}, edges {:.1f} mm", attempt + 1, most_tries, edge_mm));
     DecimateResult result;
     if (!refine_to_bound(measure, start, edge_mm, options, result)) {
       edge_mm *= 0.8;

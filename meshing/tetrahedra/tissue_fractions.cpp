@@ -23,23 +23,9 @@ constexpr int divisions = 7;    // of a tetrahedron's edges: 84 points
 constexpr int near_voxels = 3;  // the surface stays this close to the voxels it came from
 constexpr int far_voxels = 10;
 constexpr double most_outside = 0.05;
-constexpr int none = -1;
+constexpr std::ptrdiff_t none = -1;
 
 bool meshed(int tissue) { return segmentation::is_meshed(static_cast<Tissue>(tissue)); }
-
-// Barycentric coordinates of the points, all of the same weight.
-std::vector<Eigen::RowVector4d> sample_points() {
-  std::vector<Eigen::RowVector4d> points;
-  for (int i = 0; i < divisions; ++i) {
-    for (int j = 0; i + j < divisions; ++j) {
-      for (int k = 0; i + j + k < divisions; ++k) {
-        const int l = divisions - 1 - i - j - k;
-        points.push_back((Eigen::RowVector4d(i, j, k, l).array() + 0.25) / divisions);
-      }
-    }
-  }
-  return points;
-}
 
 // Voxel steps within `radius` voxels (of the finest axis), nearest first in mm.
 std::vector<Eigen::Vector3i> steps_by_distance(const Grid& grid, int radius) {
@@ -65,19 +51,20 @@ class TissueAt {
         near_(steps_by_distance(labels.grid, near_voxels)),
         far_(steps_by_distance(labels.grid, far_voxels)) {}
 
-  int near(const Eigen::Vector3d& p) const { return search(p, near_); }
-  int far(const Eigen::Vector3d& p) const { return search(p, far_); }
+  /// The meshed voxel next to a point, as an index; none without one.
+  std::ptrdiff_t near(const Eigen::Vector3d& p) const { return search(p, near_); }
+  std::ptrdiff_t far(const Eigen::Vector3d& p) const { return search(p, far_); }
 
  private:
-  int search(const Eigen::Vector3d& p, const std::vector<Eigen::Vector3i>& steps) const {
+  std::ptrdiff_t search(const Eigen::Vector3d& p, const std::vector<Eigen::Vector3i>& steps) const {
     const Eigen::Vector3d index = labels_.grid.continuous_index(p);
     if (!(index.array().abs() < 1e6).all()) return none;
     const Eigen::Vector3i home = index.array().round().cast<int>();
     for (const Eigen::Vector3i& step : steps) {
       const Eigen::Vector3i v = home + step;
       if (!labels_.grid.contains(v.x(), v.y(), v.z())) continue;
-      const int tissue = labels_.at(v.x(), v.y(), v.z());
-      if (meshed(tissue)) return tissue;
+      const std::size_t n = labels_.grid.index(v.x(), v.y(), v.z());
+      if (meshed(labels_.voxels[n])) return static_cast<std::ptrdiff_t>(n);
     }
     return none;
   }
@@ -104,11 +91,38 @@ void check_fit(const TetMesh& mesh, const std::vector<double>& outside, Fraction
       100 * report.outside_share, place.x(), place.y(), place.z(), 100 * most_outside));
 }
 
+/// Adds a voxel to the tissues it holds. @param gland_share  of a voxel of fat or gland; NaN = by the label alone
+void count_voxel(int tissue, float gland_share, std::array<double, segmentation::tissue_count>& hits) {
+  const bool mixed = tissue == static_cast<int>(Tissue::adipose) || tissue == static_cast<int>(Tissue::gland);
+  if (!mixed || std::isnan(gland_share)) {
+    hits[tissue] += 1;
+    return;
+  }
+  hits[static_cast<int>(Tissue::gland)] += gland_share;
+  hits[static_cast<int>(Tissue::adipose)] += 1 - gland_share;
+}
+
 }  // namespace
 
-FractionReport assign_tissue(TetMesh& mesh, const LabelImage& labels) {
+const std::vector<Eigen::RowVector4d>& cell_samples() {
+  static const std::vector<Eigen::RowVector4d> samples = [] {
+    std::vector<Eigen::RowVector4d> points;
+    for (int i = 0; i < divisions; ++i) {
+      for (int j = 0; i + j < divisions; ++j) {
+        for (int k = 0; i + j + k < divisions; ++k) {
+          const int l = divisions - 1 - i - j - k;
+          points.push_back((Eigen::RowVector4d(i, j, k, l).array() + 0.25) / divisions);
+        }
+      }
+    }
+    return points;
+  }();
+  return samples;
+}
+
+FractionReport assign_tissue(TetMesh& mesh, const LabelImage& labels, std::span<const float> gland_share) {
   const TissueAt tissue_at(labels);
-  const std::vector<Eigen::RowVector4d> samples = sample_points();
+  const std::vector<Eigen::RowVector4d>& samples = cell_samples();
   const Eigen::Index count = mesh.cells.rows();
   mesh.fraction = Table::Zero(count, segmentation::tissue_count);
   mesh.tissue.resize(count);
@@ -117,20 +131,20 @@ FractionReport assign_tissue(TetMesh& mesh, const LabelImage& labels) {
   for (Eigen::Index c = 0; c < count; ++c) {
     Eigen::Matrix<double, 4, 3> corners;
     for (int k = 0; k < 4; ++k) corners.row(k) = mesh.points.row(mesh.cells(c, k));
-    std::array<int, segmentation::tissue_count> hits{};
+    std::array<double, segmentation::tissue_count> hits{};
     int all = 0;
     for (const Eigen::RowVector4d& sample : samples) {
-      const int tissue = tissue_at.near((sample * corners).transpose());
-      if (tissue == none) continue;
-      ++hits[tissue];
+      const std::ptrdiff_t voxel = tissue_at.near((sample * corners).transpose());
+      if (voxel == none) continue;
+      count_voxel(labels.voxels[voxel], gland_share.empty() ? NAN : gland_share[voxel], hits);
       ++all;
     }
     outside[c] = 1 - static_cast<double>(all) / static_cast<double>(samples.size());
     if (all == 0) {
-      const int tissue = tissue_at.far(corners.colwise().mean().transpose());
-      hits[tissue == none ? static_cast<int>(Tissue::adipose) : tissue] = all = 1;
+      const std::ptrdiff_t voxel = tissue_at.far(corners.colwise().mean().transpose());
+      hits[voxel == none ? static_cast<int>(Tissue::adipose) : labels.voxels[voxel]] = all = 1;
     }
-    for (int t = 0; t < segmentation::tissue_count; ++t) mesh.fraction(c, t) = static_cast<double>(hits[t]) / all;
+    for (int t = 0; t < segmentation::tissue_count; ++t) mesh.fraction(c, t) = hits[t] / all;
     mesh.tissue[c] = static_cast<int>(std::max_element(hits.begin(), hits.end()) - hits.begin());
   }
   FractionReport report;

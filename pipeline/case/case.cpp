@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 
 constexpr double unit_tolerance = 1e-3;  // of a gravity vector's length
 constexpr double same_direction_rad = 1e-3;
+constexpr const char* undeformed = "undeformed";  // as pose of an image: free of load
+constexpr double most_noise_mm = 20;
 
 /// Names of files that tools write; a pose of that name would overwrite them.
 const std::vector<std::string> reserved_names = {"undeformed",  "mesh",   "labels",       "breast",     "muscle",
@@ -31,7 +33,7 @@ Eigen::Vector3d read_gravity(const TomlReader& pose, const std::string& frame) {
   if (!given) pose.fail("gravity", "is missing: give the direction in which things fall, as three numbers of length 1");
   const Eigen::Vector3d vector = *given;
   const double length = vector.norm();
-  if (length == 0) pose.fail("gravity", "is zero; give the direction in which things fall, of length 1");
+  if (length == 0) return vector;  // buoyancy: read_poses() sees where that is meant
   if (std::abs(length - 1) > unit_tolerance) {
     const Eigen::Vector3d unit = vector / length;
     pose.fail(
@@ -55,13 +57,14 @@ constexpr KnownKey known_keys[] = {{"registration_mm", &Known::registration_mm, 
                                    {"breath_mm", &Known::breath_mm, 30},
                                    {"noise_shared_mm", &Known::noise_shared_mm, 10}};
 
-Known read_known(const TomlReader& reader, const std::string& name) {
+Known read_known(const TomlReader& reader, const std::string& name, const std::string& imaged) {
   Known known;
   for (const KnownKey& row : known_keys) {
     const auto value = reader.number(row.key);
     if (!value) continue;
-    if (name == "prone")
-      reader.fail(row.key, "says how well another pose is known beside the image; leave it out of [pose.prone]");
+    if (name == imaged)
+      reader.fail(row.key,
+                  fmt::format("says how well another pose is known beside the image; leave it out of [pose.{}]", name));
     if (*value < 0 || *value > row.most)
       reader.fail(row.key, fmt::format("is 1 sigma and must lie in 0 to {:g}, not {:g}", row.most, *value));
     known.*row.member = value;
@@ -69,19 +72,26 @@ Known read_known(const TomlReader& reader, const std::string& name) {
   return known;
 }
 
-Pose read_pose(const TomlReader& reader, const std::string& name, const std::string& frame) {
+Pose read_pose(const TomlReader& reader, const std::string& name, const Case& result) {
   std::vector<std::string> keys = {"gravity", "surface", "noise_mm", "landmarks"};
   for (const KnownKey& row : known_keys) keys.emplace_back(row.key);
   reader.allow(keys);
   Pose pose;
   pose.name = name;
-  pose.gravity = read_gravity(reader, frame);
+  pose.gravity = read_gravity(reader, result.frame);
   if (reader.has("surface")) pose.surface = case_path(reader, "surface", false);
   if (reader.has("landmarks")) pose.landmarks = case_path(reader, "landmarks", false);
   pose.noise_mm = reader.number("noise_mm");
   if (pose.noise_mm && *pose.noise_mm <= 0)
     reader.fail("noise_mm", "must be > 0 mm; leave the key out when the noise is not known");
-  pose.known = read_known(reader, name);
+  if (pose.noise_mm && *pose.noise_mm > most_noise_mm)
+    reader.fail("noise_mm", fmt::format("must be at most {:g} mm, not {:g}; was it meant in micrometres?",
+                                        most_noise_mm, *pose.noise_mm));
+  pose.known = read_known(reader, name, result.imaged_pose);
+  if (pose.gravity.isZero(0) && name != result.imaged_pose && (!pose.surface || name == "supine"))
+    reader.fail("gravity",
+                "is zero; give the direction in which things fall, of length 1. Zero (buoyancy) is for a pose "
+                "that is imaged or measured");
   return pose;
 }
 
@@ -93,10 +103,15 @@ void check_pose_name(const TomlReader& poses, const std::string& name) {
     poses.fail(name, "this name belongs to a file the tools write; give the pose another");
 }
 
-void check_directions_differ(const TomlReader& poses, const std::vector<Pose>& all) {
+/// Two scans of an object under the same load are two measurements of it.
+void check_directions_differ(const TomlReader& poses, const Case& result) {
+  const std::vector<Pose>& all = result.poses;
   for (std::size_t i = 0; i < all.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
       const Eigen::Vector3d &a = all[i].gravity, &b = all[j].gravity;
+      if (a.isZero(0) != b.isZero(0) || all[j].name == undeformed ||
+          (result.is_object() && all[i].surface && all[j].surface))
+        continue;
       if (std::atan2(a.cross(b).norm(), a.dot(b)) >= same_direction_rad) continue;
       poses.sub_table(all[i].name)
           ->fail("gravity",
@@ -105,44 +120,64 @@ void check_directions_differ(const TomlReader& poses, const std::vector<Pose>& a
     }
 }
 
-/// prone and supine first, the others as they stand in the file.
-std::vector<std::string> pose_order(const TomlReader& poses) {
+/// The imaged one and supine first, as far as they must be there or are, the others as they stand in the file.
+std::vector<std::string> pose_order(const TomlReader& poses, const Case& result) {
+  std::vector<std::string> names;
+  if (result.imaged_pose != undeformed) names.push_back(result.imaged_pose);
+  if (result.imaged_pose != "supine" && (!result.is_object() || poses.has("supine"))) names.emplace_back("supine");
   std::vector<std::pair<toml::source_position, std::string>> others;
   for (const auto& [key, node] : poses.table())
-    if (key != "prone" && key != "supine") others.emplace_back(key.source().begin, std::string(key.str()));
+    if (std::find(names.begin(), names.end(), key.str()) == names.end())
+      others.emplace_back(key.source().begin, std::string(key.str()));
   std::sort(others.begin(), others.end(), [](const auto& a, const auto& b) {
     return std::pair(a.first.line, a.first.column) < std::pair(b.first.line, b.first.column);
   });
-  std::vector<std::string> names = {"prone", "supine"};
   for (auto& [position, name] : others) names.push_back(std::move(name));
   return names;
 }
 
 void read_poses(const TomlReader& file, Case& result) {
   const auto poses = file.sub_table("pose");
+  if (!poses && result.is_object()) file.fail("pose", "tables [pose.NAME] are missing: they say how things fall");
   if (!poses) file.fail("pose", "tables [pose.prone] and [pose.supine] are missing: they say how things fall");
-  for (const std::string& name : pose_order(*poses)) {
+  if (result.imaged_pose == undeformed) result.poses.push_back({undeformed, Eigen::Vector3d::Zero(), {}, {}, {}, {}});
+  for (const std::string& name : pose_order(*poses, result)) {
     const auto pose = poses->sub_table(name);
+    if (!pose && name == result.imaged_pose && name != "prone")
+      poses->fail(name,
+                  fmt::format("table [pose.{}] is missing: [image] pose names it as the pose that was imaged", name));
     if (!pose) poses->fail(name, fmt::format("table [pose.{}] is missing", name));
     check_pose_name(*poses, name);
-    result.poses.push_back(read_pose(*pose, name, result.frame));
+    result.poses.push_back(read_pose(*pose, name, result));
   }
-  check_directions_differ(*poses, result.poses);
+  check_directions_differ(*poses, result);
 }
 
 void read_landmark_table(const TomlReader& file, Case& result) {
   if (const auto landmarks = file.sub_table("landmarks")) {
-    landmarks->allow({"prone"});
-    if (landmarks->has("prone")) result.prone_landmarks = case_path(*landmarks, "prone", false);
+    landmarks->allow({result.imaged_pose});
+    if (landmarks->has(result.imaged_pose)) result.prone_landmarks = case_path(*landmarks, result.imaged_pose, false);
   }
   if (result.prone_landmarks) return;
   for (const Pose& pose : result.poses)
     if (pose.landmarks)
       file.sub_table("pose")->sub_table(pose.name)->fail(
-          "landmarks", "needs the prone position of the same points: add [landmarks] with prone = \"FILE.csv\"");
+          "landmarks", fmt::format("needs the {0} position of the same points: add [landmarks] with {0} = \"FILE.csv\"",
+                                   result.imaged_pose));
+}
+
+std::vector<std::string> default_calibrated(const Case& result) {
+  std::vector<std::string> measured;
+  for (const Pose& pose : result.poses) {
+    if (pose.name == result.imaged_pose) continue;
+    if (pose.name == "supine" && (pose.surface || !result.is_object())) return {"supine"};
+    if (pose.surface) measured.push_back(pose.name);
+  }
+  return measured;
 }
 
 void read_calibration(const TomlReader& file, Case& result) {
+  result.calibrated_poses = default_calibrated(result);
   const auto calibration = file.sub_table("calibration");
   if (!calibration) return;
   calibration->allow({"poses"});
@@ -153,6 +188,8 @@ void read_calibration(const TomlReader& file, Case& result) {
     const auto pose =
         std::find_if(result.poses.begin(), result.poses.end(), [&](const Pose& p) { return p.name == *name; });
     if (pose == result.poses.end()) calibration->fail("poses", fmt::format("there is no [pose.{}]", *name));
+    if (pose->name == result.imaged_pose)
+      calibration->fail("poses", fmt::format("\"{}\" is the imaged pose: nothing of it is predicted", *name));
     if (!pose->surface) calibration->fail("poses", fmt::format("[pose.{}] has no surface to fit", *name));
     if (std::find(names->begin(), name, *name) != name)
       calibration->fail("poses", fmt::format("\"{}\" is listed twice", *name));
@@ -178,9 +215,15 @@ void read_register(const TomlReader& file, Case& result) {
 void read_head(const TomlReader& file, Case& result) {
   const auto head = file.sub_table("case");
   if (!head) file.fail("case", "table [case] is missing: it says name, frame and side");
-  head->allow({"name", "frame", "side"});
+  head->allow({"name", "frame", "side", "body"});
   result.name = head->required_text("name");
   result.frame = head->choice("frame", {"LPS", "RAS"}, "LPS");
+  result.body = head->choice("body", {"breast", "object"}, "breast");
+  if (result.is_object()) {
+    if (head->has("side")) head->fail("side", "belongs to body = \"breast\"; an object has none, leave it out");
+    result.side = "none";
+    return;
+  }
   head->required_text("side");
   result.side = head->choice("side", {"left", "right", "both"}, "");
 }
@@ -206,7 +249,7 @@ Case read_case(const fs::path& folder) {
         fmt::format("{} is not there; a case is a folder with a case.toml (docs/case-file.md)", path.string()));
   const toml::table table = parse_toml(path);
   const TomlReader file(table, path, "");
-  file.allow({"case", "image", "segmentation", "pose", "landmarks", "calibration", "register"});
+  file.allow({"case", "image", "segmentation", "pose", "landmarks", "calibration", "register", "priors"});
   Case result;
   result.folder = folder;
   read_head(file, result);
@@ -215,6 +258,11 @@ Case read_case(const fs::path& folder) {
   read_landmark_table(file, result);
   read_calibration(file, result);
   read_register(file, result);
+  if (const auto priors = file.sub_table("priors")) {
+    priors->allow({"cohort"});
+    priors->require("cohort");
+    result.cohort = case_path(*priors, "cohort", false);
+  }
   return result;
 }
 

@@ -34,27 +34,101 @@ void read_cut(const TomlReader& image, AllowedCuts& cut) {
   cut.rim_mm = *rim_mm;
 }
 
-void read_labels(const TomlReader& labels, std::map<int, Tissue>& result) {
-  labels.allow({tissue_names.begin(), tissue_names.end()});
+/// What may stand in [image.labels]: the tissues, and `support`, the rigid thing that tissue holds on to, which is what
+/// the muscle is.
+std::vector<std::pair<std::string, Tissue>> label_keys() {
+  std::vector<std::pair<std::string, Tissue>> keys;
+  for (int t = 0; t < segmentation::tissue_count; ++t)
+    keys.emplace_back(std::string(tissue_names[t]), static_cast<Tissue>(t));
+  keys.emplace_back("support", Tissue::muscle);
+  return keys;
+}
+
+void read_labels(const TomlReader& labels, bool object, std::map<int, Tissue>& result) {
+  std::vector<std::string> keys;
+  for (const auto& [key, tissue] : label_keys()) keys.push_back(key);
+  labels.allow(keys);
   bool muscle = false, meshed = false;
-  for (int t = 0; t < segmentation::tissue_count; ++t) {
-    const auto values = labels.integers(tissue_names[t]);
+  for (const auto& [key, tissue] : label_keys()) {
+    const auto values = labels.integers(key);
     if (!values) continue;
     if (values->empty())
-      labels.fail(tissue_names[t], "lists no label value; give the values the volume uses, or leave the key out");
-    const Tissue tissue = static_cast<Tissue>(t);
+      labels.fail(key, "lists no label value; give the values the volume uses, or leave the key out");
     muscle |= tissue == Tissue::muscle;
     meshed |= is_meshed(tissue);
     for (const int value : *values) {
       const auto [known, added] = result.emplace(value, tissue);
       if (!added)
-        labels.fail(tissue_names[t],
-                    fmt::format("label value {} is listed already, for {}; each value belongs to one tissue", value,
-                                tissue_names[static_cast<int>(known->second)]));
+        labels.fail(key, fmt::format("label value {} is listed already, for {}; each value belongs to one tissue",
+                                     value, tissue_names[static_cast<int>(known->second)]));
     }
   }
+  if (!muscle && object)
+    labels.fail("support", "is missing: the label value of the rigid thing that holds the body must be given");
   if (!muscle) labels.fail("muscle", "is missing: the breast slides on the muscle, so its label value must be given");
   if (!meshed) labels.fail("adipose", "no soft tissue is listed; give at least adipose or gland");
+}
+
+NamedPlace read_place(const TomlReader& table, const std::string& name, bool support, const std::string& frame) {
+  std::vector<std::string> keys = {"file", "point", "normal"};
+  if (support) keys.insert(keys.end(), {"within_mm", "faces"});
+  table.allow(keys);
+  NamedPlace place;
+  place.name = name;
+  if (table.has("file") == table.has("point"))
+    table.fail(table.has("file") ? "point" : "file",
+               "a support or part is a surface (file) or a plane (point and normal): give one of the two");
+  if (table.has("file")) {
+    place.file = case_path(table, "file", false);
+  } else {
+    table.require("normal");
+    place.point = *table.vector("point");
+    place.normal = *table.vector("normal");
+    if (!(place.normal.norm() > 0)) table.fail("normal", "is zero; give the direction in which the plane faces");
+    place.normal.normalize();
+    if (frame == "RAS")
+      for (Eigen::Vector3d* v : {&place.point, &place.normal}) v->head<2>() *= -1;
+  }
+  if (!support) return place;
+  place.within_mm = table.number("within_mm", positive).value_or(place.within_mm);
+  place.beyond = table.choice("faces", {"on", "beyond"}, "on") == "beyond";
+  if (place.beyond && place.file)
+    table.fail("faces", "belongs to a plane: \"beyond\" takes what lies on its outer side");
+  return place;
+}
+
+bool is_plain_name(const std::string& name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(),
+                                      [](unsigned char c) { return (c < 128 && std::isalnum(c)) || c == '_'; });
+}
+
+std::vector<NamedPlace> read_named(const TomlReader& image, const char* key, bool support, const std::string& frame) {
+  std::vector<NamedPlace> places;
+  const auto table = image.sub_table(key);
+  if (!table) return places;
+  std::vector<std::pair<toml::source_position, std::string>> names;  // as they stand in the file
+  for (const auto& [name, node] : table->table()) names.emplace_back(name.source().begin, std::string(name.str()));
+  std::sort(names.begin(), names.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.first.line, a.first.column) < std::pair(b.first.line, b.first.column);
+  });
+  for (const auto& [place, name] : names) {
+    if (!is_plain_name(name)) table->fail(name, "a support or part names arrays: use letters, digits and _ only");
+    const auto entry = table->sub_table(name);
+    if (!entry) table->fail(name, fmt::format("must be a table: write [image.{}.{}]", key, name));
+    places.push_back(read_place(*entry, name, support, frame));
+  }
+  return places;
+}
+
+void read_places(const TomlReader& image, bool surface, Case& result) {
+  for (const char* key : {"supports", "parts"})
+    if (!surface && image.has(key))
+      image.fail(key, "belongs to kind = \"surface\"; in a label map supports and parts are labels ([image.labels])");
+  if (!surface) return;
+  result.supports = read_named(image, "supports", true, result.frame);
+  result.parts = read_named(image, "parts", false, result.frame);
+  if (result.supports.empty())
+    image.fail("supports", "is missing: nothing holds the body; add [image.supports.NAME] with a plane or a surface");
 }
 
 }  // namespace
@@ -70,10 +144,18 @@ fs::path case_path(const TomlReader& reader, std::string_view key, bool folder_a
 void read_case_image(const TomlReader& file, Case& result) {
   const auto image = file.sub_table("image");
   if (!image) file.fail("image", "table [image] is missing: it names the volume");
-  image->allow({"file", "kind", "frame", "series", "cut", "rim_mm", "labels", "segmentation_mm"});
+  image->allow(
+      {"file", "kind", "frame", "series", "cut", "rim_mm", "labels", "segmentation_mm", "pose", "supports", "parts"});
   image->required_text("kind");
-  result.image_kind = image->choice("kind", {"labels", "mri"}, "labels");
-  result.image_file = case_path(*image, "file", true);
+  result.image_kind = image->choice("kind", {"labels", "mri", "surface"}, "labels");
+  result.imaged_pose = image->text("pose").value_or("prone");
+  if (result.is_object() && !image->has("pose"))
+    image->fail("pose",
+                "is missing: name the pose in which the object was imaged, or \"undeformed\" for a shape free of "
+                "load (CAD, cast, buoyancy)");
+  const bool surface = result.image_kind == "surface";
+  result.image_file = case_path(*image, "file", !surface);
+  read_places(*image, surface, result);
   if (const auto series = image->text("series")) {
     if (!fs::is_directory(result.image_file))
       image->fail("series", "has no effect: image.file is a file, only a DICOM folder holds series");
@@ -98,13 +180,15 @@ void read_case_image(const TomlReader& file, Case& result) {
   const bool needs_labels = result.image_kind == "labels";
   if (needs_labels && !labels)
     image->fail("labels", "table [image.labels] is missing: it says which value is which tissue");
-  if (labels) read_labels(*labels, result.labels);
+  if (labels) read_labels(*labels, result.is_object(), result.labels);
 
   const auto recipe = file.sub_table("segmentation");
   if (!recipe) return;
-  if (needs_labels)
+  if (result.image_kind != "mri")
     file.fail("segmentation", "is read only when [image] kind = \"mri\"; take the table out, or change kind");
   result.recipe = segmentation::read_recipe(*recipe, result.frame);
+  // A recipe that finds the breast in a whole chest ends it where the chest goes on.
+  if (!result.recipe->name.empty() && !image->has("cut")) result.cut.excluded = result.cut.edge = result.cut.rim = true;
 }
 
 }  // namespace supine::pipeline

@@ -14,10 +14,13 @@
 #include "calibration/signed_distance.h"
 #include "common/error.h"
 #include "common/landmarks.h"
-#include "meshing/mesh_io.h"
+#include "meshing/imaged_mesh.h"
+#include "pipeline/case/model_checks.h"
 #include "pipeline/case/model_file.h"
+#include "pipeline/case/scan_readings.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/model_fields.h"
+#include "simulation/solve/carrying_modulus.h"
 
 namespace supine::pipeline {
 namespace {
@@ -28,6 +31,8 @@ using calibration::Measurement;
 bool is_fitted(const Case& c, const std::string& pose) {
   return std::find(c.calibrated_poses.begin(), c.calibrated_poses.end(), pose) != c.calibrated_poses.end();
 }
+
+simulation::PoseLoad imaged_load(const Case& c) { return {c.imaged_pose, c.imaged().gravity}; }
 
 /// Fitted poses first, then the other measured ones.
 std::vector<Pose> measured_poses(const Case& c) {
@@ -42,22 +47,42 @@ std::vector<Pose> measured_poses(const Case& c) {
     poses.push_back(pose);
   }
   for (const Pose& pose : c.poses)
-    if (pose.surface && pose.name != "prone" && !is_fitted(c, pose.name)) poses.push_back(pose);
+    if (pose.surface && pose.name != c.imaged_pose && !is_fitted(c, pose.name)) poses.push_back(pose);
   return poses;
 }
 
-void solve_start(MeasuredCase& in, const std::vector<Pose>& poses) {
-  std::vector<simulation::PoseLoad> loads = {{"prone", in.description.pose("prone").gravity}};
+/// A fit needs a shape to start from: a free modulus under which there is none is raised to one that has one.
+void start_stiffer(Run& run, MeasuredCase& in, const std::vector<simulation::PoseLoad>& loads, double carried) {
+  constexpr double close_enough = 1.3, clear_of_the_end = 1.1;
+  simulation::Setting& modulus = in.model.breast.young_modulus_kpa;
+  simulation::ModulusSearch search{.ratio = close_enough, .softest_kpa = modulus.value, .stiffest_kpa = modulus.upper};
+  const auto found = simulation::find_carrying_modulus(in.mesh, in.anatomy, in.model, loads, search);
+  run.warn(fmt::format(
+      "{}: breast.young_modulus_kpa = {:.3g} carries the body under {:.0f} % of gravity only; {:.3g}, which carries "
+      "it, "
+      "is taken to start from and as the middle of its prior. supine-simulate --find-modulus finds the least",
+      in.model_file.string(), modulus.value, 100 * carried, clear_of_the_end * found.carries_kpa));
+  modulus.value = std::min(clear_of_the_end * found.carries_kpa, modulus.upper);
+  in.start = simulation::Chain(in.mesh, in.anatomy, in.model, loads).solve(in.model, &found.solution);
+}
+
+void solve_start(Run& run, MeasuredCase& in, const std::vector<Pose>& poses) {
+  std::vector<simulation::PoseLoad> loads = {imaged_load(in.description)};
   for (const Pose& pose : poses) loads.push_back({pose.name, pose.gravity});
   simulation::Chain chain(in.mesh, in.anatomy, in.model, loads);
   for (std::size_t p = 1; p < loads.size(); ++p)
     simulation::check_effects_act(in.model, {in.mesh, in.anatomy, chain.mechanics().layout(), loads[p].name});
-  in.start = chain.solve(in.model);
+  try {
+    in.start = chain.solve(in.model);
+  } catch (const simulation::NoEquilibrium& failure) {
+    if (!in.model.breast.young_modulus_kpa.free) throw;
+    start_stiffer(run, in, loads, failure.load());
+  }
 }
 
 /// Rows of the scan that are left out; told where there are many.
 std::vector<int> left_out(Run& run, const calibration::Scan& scan, const calibration::ModelSkin& skin,
-                          double given_noise_mm, const std::string& name) {
+                          double given_noise_mm, const std::string& name, const std::string& body) {
   constexpr double worth_a_warning = 0.001;
   calibration::SignedDistances distances;
   calibration::scan_to_model(skin, scan.points(), distances);
@@ -65,10 +90,11 @@ std::vector<int> left_out(Run& run, const calibration::Scan& scan, const calibra
   const double share = static_cast<double>(found.points.size()) / std::max(1, found.over_skin);
   if (share > worth_a_warning) {
     const auto first = scan.points().row(found.points.front());
-    run.warn(fmt::format(
-        "{}: {} of {} points over the breast ({:.1f} %) stand out of their neighbours by more than "
-        "four times the noise ({:.2f} mm), the first at ({:.1f}, {:.1f}, {:.1f}) mm; they are left out",
-        name, found.points.size(), found.over_skin, 100 * share, found.noise_mm, first.x(), first.y(), first.z()));
+    run.warn(
+        fmt::format("{}: {} of {} points over the {} ({:.1f} %) stand out of their neighbours by more than "
+                    "four times the noise ({:.2f} mm), the first at ({:.1f}, {:.1f}, {:.1f}) mm; they are left out",
+                    name, found.points.size(), found.over_skin, body, 100 * share, found.noise_mm, first.x(), first.y(),
+                    first.z()));
   }
   return std::move(found.points);
 }
@@ -78,9 +104,11 @@ void read_scan(Run& run, MeasuredCase& in, const Pose& pose, std::size_t row) {
   const auto surface = reconstruction::read_surface(run.input(*pose.surface), in.description.frame);
   const calibration::ModelSkin skin(in.mesh, in.start.poses[row].x);
   calibration::Scan scan(surface, skin, name);
-  calibration::check_placement(scan, skin, in.mesh.muscle, name);
+  std::vector<PosePoints> others;
+  for (const simulation::PoseSolution& solved : in.start.poses) others.push_back({solved.name, &solved.x});
+  check_scan(run, in.description, pose, scan, in.mesh, skin, in.start.poses[row].x, others);
   auto& list = is_fitted(in.description, pose.name) ? in.fitted : in.held_out;
-  std::vector<int> standing_out = left_out(run, scan, skin, pose.noise_mm.value_or(0), name);
+  std::vector<int> standing_out = left_out(run, scan, skin, pose.noise_mm.value_or(0), name, in.description.body);
   list.push_back(Measurement{{pose.name, pose.gravity}, std::move(scan), pose.noise_mm, std::move(standing_out)});
 }
 
@@ -117,7 +145,7 @@ const calibration::MeasuredLandmarks* believable_landmarks(const MeasuredCase& i
 }
 
 calibration::MeasuredScene scene_of(const MeasuredCase& in, bool whole, bool marked) {
-  calibration::MeasuredScene scene{&in.mesh, &in.anatomy, {"prone", in.description.pose("prone").gravity}, {}};
+  calibration::MeasuredScene scene{&in.mesh, &in.anatomy, imaged_load(in.description), {}};
   for (const Measurement& m : in.fitted) scene.measurements.push_back(&m);
   for (const Measurement& m : in.held_out)
     if (whole) scene.measurements.push_back(&m);
@@ -161,10 +189,11 @@ std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const fs::path& folde
   in->description = read_case(folder);
   in->model_file = model_file.empty() ? folder / "model.toml" : model_file;
   in->model = read_model(run.input(in->model_file));
-  in->mesh = meshing::read_mesh(run.input(mesh_file));
-  in->anatomy = meshing::compute_anatomy(in->mesh, in->description.side);
+  in->mesh = meshing::read_imaged_mesh(run.input(mesh_file), in->description.side);
+  in->anatomy = meshing::compute_anatomy(in->mesh, in->description.side, in->description.imaged_pose);
+  if (!in->description.is_object()) check_weight(in->model, in->anatomy, in->model_file);
   const std::vector<Pose> poses = measured_poses(in->description);
-  solve_start(*in, poses);
+  solve_start(run, *in, poses);
   for (std::size_t p = 0; p < poses.size(); ++p) read_scan(run, *in, poses[p], p);
   read_pose_landmarks(run, *in, poses);
   return in;

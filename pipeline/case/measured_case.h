@@ -22,14 +22,14 @@ namespace supine::pipeline {
 struct MeasuredCase {
   Case description;
   std::filesystem::path model_file;
-  simulation::Model model;
+  simulation::Model model;  ///< as given, or stiffer where that has no equilibrium
   meshing::TetMesh mesh;
   meshing::Anatomy anatomy;
   std::vector<calibration::Measurement> fitted;    ///< in the order of [calibration] poses
   std::vector<calibration::Measurement> held_out;  ///< every other measured pose
   /// Of the poses that have some, by name; without sigma_mm in either file 1.5 mm.
   std::map<std::string, calibration::MeasuredLandmarks> landmarks;
-  simulation::ChainSolution start;  ///< of the model as given; poses: fitted, then held out
+  simulation::ChainSolution start;  ///< of the model; poses: fitted, then held out
 
   /// The surfaces that are fitted.
   calibration::MeasuredScene fitted_scene() const;
@@ -43,10 +43,12 @@ struct MeasuredCase {
 };
 
 /// Reads and checks all of it, and solves the model as given once, because only a predicted skin tells which side of a
-/// scan is outside and whether it lies at the body.
+/// scan is outside and whether it lies at the body. A free breast.young_modulus_kpa under which there is no equilibrium
+/// is raised to one under which there is, with a warning.
 /// @throws InputError  a fitted pose without a surface; no interface; side = "both" without two breasts; a scan that is
 ///   not at the body; a landmark without a place in prone; effects that can change nothing
-/// @throws NumericalFailure  no equilibrium with the model as given
+/// @throws NumericalFailure  no equilibrium with the model as given, and its modulus is fixed or nothing in its range
+///   carries the body
 std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const std::filesystem::path& folder,
                                                  const std::filesystem::path& mesh_file,
                                                  const std::filesystem::path& model_file);

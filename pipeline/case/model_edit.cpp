@@ -122,8 +122,8 @@ std::string effect_block(const Effect& effect) {
   std::string block = fmt::format("[[effect]]  # {}\nname = \"{}\"\n", effect.meaning(), effect.name());
   for (const Parameter& row : effect.parameters()) block += parameter_line(row);
   for (const auto& option : effect.options())
-    block += fmt::format("{} = \"{}\"  # {}: {}\n", option.name, option.default_value, listed(option.values),
-                         option.meaning);
+    block += fmt::format("{} = \"{}\"  # {}: {}\n", option.name, option.default_value,
+                         option.values.empty() ? "a name" : listed(option.values), option.meaning);
   return block;
 }
 
@@ -163,7 +163,8 @@ std::string with_values(const fs::path& file, const std::map<std::string, double
   for (const auto& [place, value] : places) {
     std::string& line = lines[place.begin.line - 1];
     const std::size_t begin = byte_of(line, place.begin.column), end = byte_of(line, place.end.column);
-    line.replace(begin, end - begin, fmt::format("{}", value));
+    // 12 digits: a bound that went through a logarithm and back is the bound again.
+    line.replace(begin, end - begin, fmt::format("{:.12g}", value));
   }
   std::string edited;
   for (const std::string& line : lines) edited += line + "\n";

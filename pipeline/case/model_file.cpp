@@ -74,6 +74,27 @@ void read_choice(const std::optional<TomlReader>& section, std::string_view key,
   if (section) choice = section->choice<Choice>(key, values).value_or(choice);
 }
 
+std::vector<std::pair<std::string, simulation::InterfaceKind>> interface_kinds() {
+  using simulation::InterfaceKind;
+  return {{"sliding", InterfaceKind::sliding}, {"elastic", InterfaceKind::elastic}, {"fixed", InterfaceKind::fixed}};
+}
+
+/// [supports.NAME]: what is another on one support than [interface] says.
+void read_supports(const TomlReader& file, Model& model) {
+  const auto supports = file.sub_table("supports");
+  if (!supports) return;
+  for (const auto& [key, node] : supports->table()) {
+    const std::string name(key.str());
+    const auto table = supports->sub_table(name);
+    if (!table) supports->fail(name, fmt::format("must be a table: write [supports.{}]", name));
+    table->allow({"kind", "normal_kpa_per_mm", "tangential_kpa_per_mm"});
+    simulation::SupportSetting& own = model.supports[name];
+    own.kind = table->choice<simulation::InterfaceKind>("kind", interface_kinds());
+    own.normal_kpa_per_mm = table->number("normal_kpa_per_mm", {.lower = 1e-6, .upper = 1e6});
+    own.tangential_kpa_per_mm = table->number("tangential_kpa_per_mm", {.lower = 1e-9, .upper = 1e6});
+  }
+}
+
 void read_choices(const TomlReader& file, Model& model) {
   using namespace simulation;
   const auto breast = file.sub_table("breast"), skin = file.sub_table("skin");
@@ -88,9 +109,7 @@ void read_choices(const TomlReader& file, Model& model) {
   read_choice<Compression>(skin, "compression",
                            {{"tension_field", Compression::tension_field}, {"full", Compression::full}},
                            model.skin.compression);
-  read_choice<InterfaceKind>(file.sub_table("interface"), "kind",
-                             {{"sliding", InterfaceKind::sliding}, {"fixed", InterfaceKind::fixed}},
-                             model.interface.kind);
+  read_choice<InterfaceKind>(file.sub_table("interface"), "kind", interface_kinds(), model.interface.kind);
   read_choice<CutKind>(file.sub_table("cut"), "kind", {{"elastic", CutKind::elastic}, {"held", CutKind::held}},
                        model.cut.kind);
 }
@@ -156,7 +175,9 @@ simulation::EffectSetting read_effect(const TomlReader& entry) {
     read_setting(entry, row.name, row, setting);
   }
   for (const auto& option : effect.options())
-    result.options[option.name] = entry.choice(option.name, option.values, option.default_value);
+    result.options[option.name] = option.values.empty()
+                                      ? entry.text(option.name).value_or(option.default_value)
+                                      : entry.choice(option.name, option.values, option.default_value);
   return result;
 }
 
@@ -196,9 +217,10 @@ diagnosis::Patchiness patchiness_of(const TomlReader& file) {
 simulation::Model read_model(const std::filesystem::path& path) {
   const toml::table table = parse_toml(path);
   const TomlReader file(table, path, "");
-  file.allow({"breast", "skin", "interface", "cut", "effect", "patchiness"});
+  file.allow({"breast", "skin", "interface", "supports", "cut", "effect", "patchiness"});
   Model model;
   read_base(file, model);
+  read_supports(file, model);
   read_effects(file, model);
   patchiness_of(file);  // complains of what is wrong there
   return model;

@@ -15,6 +15,7 @@
 #include "pipeline/case/measured_case.h"
 #include "pipeline/case/model_edit.h"
 #include "pipeline/case/model_file.h"
+#include "pipeline/case/population_priors.h"
 #include "pipeline/results/calibration_report.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
@@ -106,7 +107,7 @@ class CalibrateTool : public Tool {
     check_method();
     claim_targets(run);
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
-    simulation::Model model = measured_->model;
+    simulation::Model model = with_population(run, measured_->description, measured_->model);
     if (scan_offset_) add_scan_offset(model);
     const FreeParameters parameters(model);
     if (map_ > 0 && parameters.size() < 2) throw InputError("--map needs two free parameters, the model has one");
@@ -160,8 +161,8 @@ class CalibrateTool : public Tool {
     options.noise_mm = measured_->noise_mm(evaluator);
     options.near = &measured_->start;
     options.progress = [&live](const calibration::FitProgress& p) {
-      live.show(fmt::format("run {}: RMS {:.3f} mm, best {:.3f} mm, {} without equilibrium", p.evaluations, p.rms_mm,
-                            p.best_rms_mm, p.failed));
+      live.show(fmt::format("run {}: RMS {:.3f} mm, best {:.3f} mm, {} without equilibrium{}", p.evaluations, p.rms_mm,
+                            p.best_rms_mm, p.failed, p.outside_tissue ? "; at moduli that no tissue has" : ""));
     };
     for (std::size_t m = 0; m < options.noise_mm.size(); ++m)
       if (!measured_->fitted[m].noise_mm)

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <list>
 #include <optional>
 
 #include "calibration/comparison_files.h"
@@ -13,6 +14,7 @@
 #include "meshing/mesh_io.h"
 #include "pipeline/case/case.h"
 #include "pipeline/case/model_file.h"
+#include "pipeline/case/scan_readings.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
@@ -78,7 +80,7 @@ class CompareTool : public Tool {
     reconstruction::Surface surface = inputs.surface;
     surface.points = motion.corrected(surface.points);
     const calibration::Scan scan(surface, model, scan_name);
-    calibration::check_placement(scan, model, inputs.predicted.mesh.muscle, scan_name);
+    check_readings(run, inputs, scan, model);
     const auto landmarks = compare_landmarks(inputs, motion, run);
     run.stage("anatomy");
     const calibration::SkinAreas areas = find_areas(inputs);
@@ -120,8 +122,24 @@ class CompareTool : public Tool {
     return inputs;
   }
 
+  /// Against the shapes of the other poses as well, where they stand beside this one.
+  void check_readings(Run& run, const Inputs& inputs, const calibration::Scan& scan,
+                      const calibration::ModelSkin& skin) const {
+    std::list<meshing::PoseMesh> shapes;
+    std::vector<PosePoints> others;
+    for (const Pose& other : inputs.measured.poses) {
+      const fs::path file = pose_file_.parent_path() / (other.name + ".vtu");
+      if (other.name == inputs.pose.name || other.name == "prone" || !fs::exists(file)) continue;
+      shapes.push_back(meshing::read_pose(file));
+      others.push_back({other.name, &shapes.back().positions});
+    }
+    check_scan(run, inputs.measured, inputs.pose, scan, inputs.predicted.mesh, skin, inputs.predicted.positions,
+               others);
+  }
+
   calibration::SkinAreas find_areas(const Inputs& inputs) const {
-    const auto anatomy = meshing::compute_anatomy(inputs.predicted.mesh, inputs.measured.side);
+    const auto anatomy =
+        meshing::compute_anatomy(inputs.predicted.mesh, inputs.measured.side, inputs.measured.imaged_pose);
     return calibration::anatomical_areas(inputs.predicted.mesh, anatomy);
   }
 
@@ -150,7 +168,8 @@ class CompareTool : public Tool {
                                   [](const auto& effect) { return simulation::traits_of(effect.name).moves_scan; });
     Eigen::VectorXd motion = Eigen::VectorXd::Zero(6);
     if (says) {
-      const auto anatomy = meshing::compute_anatomy(inputs.predicted.mesh, inputs.measured.side);
+      const auto anatomy =
+          meshing::compute_anatomy(inputs.predicted.mesh, inputs.measured.side, inputs.measured.imaged_pose);
       const auto layout = simulation::make_layout(inputs.predicted.mesh, anatomy);
       const simulation::Scene scene{inputs.predicted.mesh, anatomy, layout, inputs.pose.name};
       motion = simulation::values_of(simulation::make_fields(inputs.model, scene, inputs.pose.gravity)).scan_motion;

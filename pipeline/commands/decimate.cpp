@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <optional>
 
 #include "common/error.h"
 #include "pipeline/tool/tool.h"
@@ -31,16 +32,19 @@ class DecimateTool : public Tool {
            "Examples:\n"
            "  supine-decimate breast.vtp --triangles 3000 --max-distance-mm 1\n"
            "  supine-decimate breast.vtp --faces 1500 --finer 12,-80,5,15,0.5\n"
+           "  supine-decimate cast.vtp --sharp-deg 40 --edge-mm 8\n"
            "  supine-decimate breast.vtp --method triangles --triangles 8000 --max-distance-mm 0.5 -o fine.vtp\n";
   }
 
   void declare(CLI::App& app) override {
     app.add_option("surface", surface_, "closed surface (.vtp .ply .stl .obj)")->required();
-    app.add_option("--triangles", options_.target_triangles, "at most so many triangles, >= 100")
-        ->capture_default_str();
-    app.add_option("--max-distance-mm", options_.max_distance_mm,
-                   "bound on the distance to the input, either way, mm, > 0")
-        ->capture_default_str();
+    app.add_option(
+        "--triangles", triangles_,
+        "at most so many triangles, >= 100; default: 2500, and of a surface of more than 900 cm2 as many more "
+        "as it is larger, up to 7500");
+    app.add_option("--max-distance-mm", max_distance_mm_,
+                   "bound on the distance to the input, either way, mm, > 0; default: 1, and of a surface of more than "
+                   "900 cm2 as much more as it is larger, up to 3");
     app.add_option("--faces", options_.target_faces, "instead: about so many quads and lone triangles, >= 50");
     app.add_option("--edge-mm", options_.edge_mm, "instead: edge length, mm, > 0");
     app.add_option("--method", method_, "quads, or triangles of one size")
@@ -49,6 +53,9 @@ class DecimateTool : public Tool {
     app.add_option("--finer", finer_,
                    "X,Y,Z,RADIUS,FACTOR: edges FACTOR times as long (0.05 to 1) within RADIUS mm of a place, growing "
                    "gently outside; may be repeated");
+    app.add_option("--sharp-deg", options_.sharp_deg,
+                   "keep edges at which faces meet at more than this, degrees (for CAD bodies, with triangles of one "
+                   "size, without --edge-mm a twentieth of the body's diagonal); 0 = none");
     app.add_flag("--open", options_.open, "accept a surface with open borders and keep them");
   }
 
@@ -58,6 +65,10 @@ class DecimateTool : public Tool {
     run.stage("decimate");
     run.progress("decimating");
     options_.method = method_ == "quads" ? meshing::DecimateMethod::quads : meshing::DecimateMethod::triangles;
+    if (options_.sharp_deg > 0 && options_.edge_mm == 0)
+      options_.edge_mm = (in.points.colwise().maxCoeff() - in.points.colwise().minCoeff()).norm() / 20;
+    follow_body(in, run);
+    options_.progress = [&run](const std::string& line) { run.progress(line); };
     if (!finer_.empty()) options_.relative_size = relative_size(in);
     const DecimateResult result = meshing::decimate(in, options_);
     run.stage("write");
@@ -110,6 +121,18 @@ class DecimateTool : public Tool {
     json["self_intersections"] = reconstruction::self_intersections(result.surface).size();
   }
 
+  /// What is not asked for follows the surface: a whole chest needs more triangles than a breast, and is less even.
+  void follow_body(const reconstruction::Surface& in, const Run& run) {
+    constexpr double one_breast_cm2 = 900, most = 3;
+    const double area_cm2 = reconstruction::check_surface(in).area_mm2 / 100;
+    const double larger = std::clamp(area_cm2 / one_breast_cm2, 1.0, most);
+    options_.target_triangles = triangles_.value_or(static_cast<int>(2500 * larger));
+    options_.max_distance_mm = max_distance_mm_.value_or(larger);
+    if (larger > 1 && (!triangles_ || !max_distance_mm_))
+      run.say(fmt::format("{:.0f} cm2 of surface: at most {} triangles within {:.2f} mm", area_cm2,
+                          options_.target_triangles, options_.max_distance_mm));
+  }
+
   Eigen::VectorXd relative_size(const reconstruction::Surface& in) const {
     Eigen::VectorXd sizes = Eigen::VectorXd::Ones(in.points.rows());
     for (const std::string& text : finer_) {
@@ -143,6 +166,8 @@ class DecimateTool : public Tool {
   }
 
   std::string surface_, method_ = "quads";
+  std::optional<int> triangles_;
+  std::optional<double> max_distance_mm_;
   std::vector<std::string> finer_;
   meshing::DecimateOptions options_;
 };

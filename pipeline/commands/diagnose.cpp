@@ -9,6 +9,7 @@
 #include "common/error.h"
 #include "pipeline/case/case_priors.h"
 #include "pipeline/case/model_file.h"
+#include "pipeline/case/population_priors.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/results/diagnosis_report.h"
 #include "pipeline/results/ladder_report.h"
@@ -149,7 +150,7 @@ class DiagnoseTool : public Tool {
   simulation::Model given_model(Run& run, const MeasuredCase& measured) const {
     const auto own = own_model(measured.model);
     if (own) run.input(case_folder_ / "model.toml");
-    return own.value_or(measured.model);
+    return with_population(run, measured.description, own.value_or(measured.model));
   }
 
   fs::path model() const {

@@ -77,7 +77,7 @@ class ModelTool : public Tool {
       run.say(fmt::format("  {}: {}", effect->name(), effect->meaning()));
       for (const Parameter& row : effect->parameters()) list_row(run, row);
       for (const auto& option : effect->options()) {
-        std::string values;
+        std::string values = option.values.empty() ? "a name" : "";
         for (const std::string& value : option.values) values += (values.empty() ? "" : ", ") + value;
         run.say(fmt::format("    {:<36}{} (default {}) {}", option.name, values, option.default_value, option.meaning));
       }

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "common/error.h"
+#include "phantom/mri/series.h"
 #include "pipeline/tool/tool.h"
 
 namespace supine::pipeline {
@@ -30,6 +31,7 @@ class PhantomTool : public Tool {
            "  supine-phantom --effect null --tilt -o trials/case-008\n"
            "  supine-phantom --realistic --effect ligament --effect adhesion --seed 3 -o trials/case-010\n"
            "  supine-phantom --prior --seed 4 --tilt -o trials/case-011\n"
+           "  supine-phantom --mri fatsat --seed 5 -o trials/mri-005\n"
            "  supine-phantom --outside coil_contact --seed 9 -o trials/case-009 --answer sealed/9.json\n";
   }
 
@@ -59,11 +61,16 @@ class PhantomTool : public Tool {
     app.add_option("--rings", options_.rings, "fineness of the truth's mesh: rings of triangles on the skin, 4 to 30")
         ->capture_default_str();
     app.add_option("--order", options_.order, "of the truth's elements: 1 linear, 2 quadratic")->capture_default_str();
+    app.add_option("--mri", series_,
+                   "instead: a made MRI series of a drawn torso with both breasts: t1, fatsat, t2 (with fat "
+                   "suppression); the answer is a label volume, answers/NAME.nrrd")
+        ->check(CLI::IsMember({"t1", "fatsat", "t2"}));
     app.add_option("--answer", answer_, "file of the answer, outside the case folder (.json)");
   }
 
   Outcome run(Run& run) override {
     const fs::path folder = case_folder();
+    if (!series_.empty()) return make_series(folder, run);
     const fs::path answer = answer_file(folder);
     take_effects();
     options_.population = populations.at(population_);
@@ -86,6 +93,29 @@ class PhantomTool : public Tool {
   }
 
  private:
+  Outcome make_series(const fs::path& folder, Run& run) {
+    if (!effects_.empty() || !options_.outside.empty() || options_.prior || options_.realistic || options_.tilt ||
+        !answer_.empty())
+      throw InputError(
+          "--mri makes a series of a drawn torso, which has no effects, poses or scans: only --seed and -o go with it");
+    const auto series = series_ == "t1"   ? phantom::Series::t1
+                        : series_ == "t2" ? phantom::Series::t2
+                                          : phantom::Series::fatsat;
+    const fs::path truth = folder.parent_path() / "answers" / (folder.filename().string() + ".nrrd");
+    run.stage("make");
+    run.progress("drawing the torso and its series");
+    const phantom::Torso torso(options_.seed);
+    const phantom::MadeSeries made = phantom::make_series(torso, options_.seed, {.series = series});
+    run.stage("write");
+    Outputs outputs(run.force());
+    phantom::write_series_folder(folder, truth, made, series, outputs);
+    outputs.commit();
+    const Eigen::Vector3i& size = made.image.grid.size;
+    run.say(fmt::format("{}: {} x {} x {} voxels; what it was made of is in {}", folder.string(), size.x(), size.y(),
+                        size.z(), truth.string()));
+    return Outcome::done;
+  }
+
   fs::path case_folder() const {
     if (output.empty()) throw InputError("name the case folder to make with -o");
     return fs::absolute(output / "").lexically_normal().parent_path();
@@ -200,7 +230,7 @@ class PhantomTool : public Tool {
   }
 
   phantom::PhantomOptions options_;
-  std::string population_ = "benchmark";
+  std::string population_ = "benchmark", series_;
   std::vector<std::string> effects_;
   fs::path answer_;
 };

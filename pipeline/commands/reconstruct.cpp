@@ -8,6 +8,9 @@
 #include <optional>
 
 #include "common/error.h"
+#include "meshing/surface/sound_surface.h"
+#include "pipeline/case/body_places.h"
+#include "pipeline/case/case.h"
 #include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
 #include "segmentation/formats/labels_io.h"
@@ -35,11 +38,14 @@ class ReconstructTool : public Tool {
            "Where cut faces are allowed is what labels.vti says (written there by supine-segment from case.toml).\n\n"
            "Examples:\n"
            "  supine-reconstruct mycase/out/labels.vti\n"
+           "  supine-reconstruct samples/silicone_bar/e -o out      (kind = \"surface\": its regions from the "
+           "supports)\n"
            "  supine-reconstruct labels.vti --cut edge,rim --rim-mm 12 -o surfaces --force\n";
   }
 
   void declare(CLI::App& app) override {
-    app.add_option("labels", labels_, "label volume (.vti)")->required();
+    app.add_option("labels", labels_, "label volume (.vti), or the folder of a case whose image is a surface")
+        ->required();
     app.add_option("--smooth-mm", smooth_mm_, "fairing length, mm, >= 0; default 0.75 of the largest voxel side");
     app.add_option("--cut", cut_, "where the model may end in a cut face, instead of what the labels say")
         ->delimiter(',')
@@ -53,6 +59,7 @@ class ReconstructTool : public Tool {
   }
 
   Outcome run(Run& run) override {
+    if (fs::is_directory(labels_)) return run_on_surface(run);
     run.stage("read");
     const segmentation::LabelImage image = segmentation::read_labels(run.input(labels_));
     options_.cut = cut_rules();
@@ -67,6 +74,44 @@ class ReconstructTool : public Tool {
   }
 
  private:
+  /// A body that came as a surface: closed as it is, regions from the supports of its case.
+  Outcome run_on_surface(Run& run) {
+    run.stage("read");
+    run.input(fs::path(labels_) / "case.toml");
+    const Case measured = read_case(labels_);
+    const std::string what = measured.image_file.string();
+    if (measured.image_kind != "surface")
+      throw InputError(
+          fmt::format("{}/case.toml: [image] kind is \"{}\"; make labels.vti with supine-segment first and "
+                      "give that",
+                      labels_, measured.image_kind));
+    const reconstruction::Surface given = reconstruction::read_surface(run.input(measured.image_file), measured.frame);
+    if (given.triangles.rows() == 0)
+      throw InputError(fmt::format("{}: has points and no triangles; a body is a closed surface", what));
+    run.stage("reconstruct");
+    OrganSurface body;
+    body.name = "body";
+    body.report = meshing::require_sound(given, meshing::Borders::closed, what).report;
+    body.surface = meshing::with_support_regions(given, read_supports(run, measured), what);
+    body.report = reconstruction::check_surface(body.surface);
+    body.voxel_volume_mm3 = body.report.volume_mm3;
+    read_parts(run, measured);
+    run.stage("write");
+    const fs::path folder = output.empty() ? fs::path(labels_) / "out" : output;
+    const fs::path file = folder / "breast.vtp", sheet = folder / "muscle.vtp";
+    reconstruction::write_surface(body.surface, run.output(file));
+    run.figures(file) = figures(body);
+    run.figures(file).erase("volume_error");
+    reconstruction::write_surface(reconstruction::reversed_region(body.surface, Region::inner), run.output(sheet));
+    run.say(
+        fmt::format("{:<10}{:>10} triangles, {:.2f} ml", "body", body.report.triangles, body.report.volume_mm3 / 1000));
+    for (const Region region : {Region::inner, Region::skin})
+      run.say(fmt::format("  {:<8}{:>8.1f} cm2", region == Region::inner ? "supports" : "skin",
+                          body.report.region_area_mm2[static_cast<int>(region)] / 100));
+    run.say(file.string());
+    return Outcome::done;
+  }
+
   CutRules cut_rules() const {
     const segmentation::LabelNotes notes = segmentation::read_label_notes(labels_);
     CutRules rules;

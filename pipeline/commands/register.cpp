@@ -167,6 +167,7 @@ class RegisterTool : public Tool {
   void draw(Run& run, const Case& description, const Pose& pose, const ScanCase& in, const Registration& found) const {
     Placed placed{{in.skin->distance().points(), in.skin->triangles(), {}}, in.scan, in.scan};
     placed.after.points = found.fit.transform.apply(in.scan.points);
+    placed.object = description.is_object();
     draw_placement(placed,
                    fmt::format("{}, {}: {:.2f} mm before, {:.2f} mm after (RMS)", description.name, pose.name,
                                found.before_mm, found.after_mm),

@@ -98,6 +98,8 @@ class ReportTool : public Tool {
                                        {"gravity", {pose.gravity.x(), pose.gravity.y(), pose.gravity.z()}},
                                        {"measured", pose.surface.has_value()},
                                        {"noise_mm", pose.noise_mm ? Json(*pose.noise_mm) : Json(nullptr)}});
+    data["case"]["imaged"] = measured.imaged_pose;
+    data["case"]["predicted"] = measured.predicted().name;
     data["case"]["calibrated_poses"] = measured.calibrated_poses;
     data["version"] = supine_version();
     data["commit"] = supine_commit();

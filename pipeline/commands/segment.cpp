@@ -5,19 +5,19 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "common/error.h"
+#include "common/suggestion.h"
 #include "pipeline/case/case.h"
-#include "pipeline/case/patient_frame.h"
+#include "pipeline/case/case_volume.h"
 #include "pipeline/tool/tool.h"
-#include "segmentation/chest/leaks.h"
-#include "segmentation/formats/data_file.h"
-#include "segmentation/formats/dicom_io.h"
-#include "segmentation/formats/image_io.h"
+#include "segmentation/doubt/doubt.h"
 #include "segmentation/formats/labels_io.h"
 #include "segmentation/label_map.h"
 #include "segmentation/overlay.h"
+#include "segmentation/recipes/shipped.h"
 #include "segmentation/steps/recipe_toml.h"
 #include "segmentation/steps/run_recipe.h"
 
@@ -49,6 +49,8 @@ struct Findings {
   std::vector<std::string> recipe_log;
   std::vector<segmentation::CutPlane> planes;         ///< of an automatic recipe
   std::array<segmentation::TissueCounts, 2> sides{};  ///< voxels left and right of the sternum plane, when there is one
+  std::vector<segmentation::Doubt> doubts;
+  std::vector<float> gland_share;  ///< per voxel; empty when no step found it
   std::string file_frame;
 };
 
@@ -74,13 +76,17 @@ class SegmentTool : public Tool {
            "Writes labels.vti (default CASE/out/labels.vti).\n\n"
            "Examples:\n"
            "  supine-segment mycase\n"
+           "  supine-segment mycase --recipe t1_auto --overlays mycase/out/overlays\n"
            "  supine-segment mycase --recipe t1.toml -o labels.vti --force\n"
+           "  supine-segment --recipes\n"
            "  supine-segment mycase --truth labels.nrrd\n";
   }
 
   void declare(CLI::App& app) override {
     app.add_option("case", case_folder_, "case folder, holds case.toml")->required();
-    app.add_option("--recipe", recipe_file_, "file with a [segmentation] table, instead of the one in case.toml");
+    app.add_option("--recipe", recipe_,
+                   "a recipe's name, or a file with a [segmentation] table, instead of case.toml's");
+    app.add_flag_callback("--recipes", list_recipes, "lists the recipes that come with the program, and ends");
     app.add_option("--overlays", overlay_folder_,
                    "folder for three PNG mosaics, one per axis, with the outlines of the tissues");
     app.add_option("--slices", overlay_options_.slices, "slices per mosaic")->check(CLI::Range(1, 64));
@@ -92,11 +98,16 @@ class SegmentTool : public Tool {
     run.stage("read");
     run.input(fs::path(case_folder_) / "case.toml");
     const Case measured = read_case(case_folder_);
+    if (measured.image_kind == "surface")
+      throw InputError(
+          fmt::format("{}: [image] is a surface: there is nothing to segment; supine-reconstruct {} reads it",
+                      case_folder_ + "/case.toml", case_folder_));
     Findings findings;
     LabelImage labels = make_labels(measured, run, findings);
     run.stage("check");
     check(measured, labels);
     findings.voxels = segmentation::count_tissues(labels);
+    check_volume(measured, labels, findings);
     count_sides(labels, findings);
     run.progress("counting components");
     findings.components = segmentation::count_components(labels);
@@ -109,21 +120,32 @@ class SegmentTool : public Tool {
     if (target.extension() != ".vti")
       throw InputError(fmt::format("-o {}: the label file ends in .vti", target.string()));
     run.progress("writing");
-    segmentation::write_labels(labels, run.output(target), notes_of(measured));
+    segmentation::write_labels(labels, run.output(target), notes_of(measured), findings.gland_share);
     fill(run.figures(target), measured, labels.grid, findings);
     if (!overlay_folder_.empty()) write_overlays(labels, run);
     say(run, labels.grid, findings, target);
-    return Outcome::done;
+    return doubtful(findings, labels, target, run);
   }
 
  private:
+  /// A body of the wrong size is one in the wrong unit.
+  static void check_volume(const Case& measured, const LabelImage& labels, const Findings& findings) {
+    constexpr double least_ml = 5, most_ml = 20000;
+    const double ml = volume_ml(labels.grid, meshed(findings.voxels));
+    if (ml >= least_ml && ml <= most_ml) return;
+    throw InputError(
+        fmt::format("{}: the tissue to be meshed has {:.3g} ml (bound {:g} to {:g}): the spacing of the "
+                    "volume must be in mm; was it written in cm or metres?",
+                    measured.image_file.string(), ml, least_ml, most_ml));
+  }
+
   LabelImage make_labels(const Case& measured, Run& run, Findings& findings) {
     const std::string file = measured.image_file.string();
-    if (!recipe_file_.empty() && measured.image_kind != "mri")
-      throw InputError(fmt::format("--recipe {}: the case has image.kind = \"{}\"; a recipe needs \"mri\"",
-                                   recipe_file_, measured.image_kind));
+    if (!recipe_.empty() && measured.image_kind != "mri")
+      throw InputError(fmt::format("--recipe {}: the case has image.kind = \"{}\"; a recipe needs \"mri\"", recipe_,
+                                   measured.image_kind));
     run.progress("reading " + file);
-    segmentation::ImageFile volume = read_volume(measured.image_file, measured, run);
+    segmentation::ImageFile volume = read_case_volume(run, measured, measured.image_file);
     findings.file_frame = volume.frame;
     check_frame(measured, volume.frame, run);
     if (measured.image_kind == "labels") {
@@ -139,12 +161,8 @@ class SegmentTool : public Tool {
                                            [&run](const std::string& line) { run.progress(line); });
     findings.recipe_log = std::move(result.log);
     findings.planes = std::move(result.planes);
-    for (const auto& wall : result.walls) {
-      double back_mm = std::numeric_limits<double>::infinity();
-      for (const auto& plane : findings.planes)
-        if (plane.name == "mid_axillary") back_mm = plane.at_mm;
-      for (const auto& leak : segmentation::find_leaks(wall, back_mm)) run.warn(segmentation::describe(leak));
-    }
+    findings.gland_share = std::move(result.fraction_gland);
+    findings.doubts = std::move(result.doubts);
     return std::move(result.labels);
   }
 
@@ -157,8 +175,9 @@ class SegmentTool : public Tool {
     if (measured.image_frame.empty() && named.empty())
       run.warn(fmt::format("the volume names no patient frame; taken as {} (case.frame; image.frame names another)",
                            measured.frame));
+    if (measured.imaged_pose != "prone" || measured.is_object()) return;
     constexpr double least_to_front = 0.5;  // of a unit vector: 60 degrees
-    const Eigen::Vector3d& falls = measured.pose("prone").gravity;
+    const Eigen::Vector3d& falls = measured.imaged().gravity;
     if (-falls.y() < least_to_front)
       run.warn(
           fmt::format("[pose.prone] gravity is LPS ({:.2f}, {:.2f}, {:.2f}); a prone patient's breast falls to the "
@@ -167,43 +186,29 @@ class SegmentTool : public Tool {
                       falls.x(), falls.y(), falls.z()));
   }
 
-  static segmentation::ImageFile read_volume(const fs::path& file, const Case& measured, Run& run) {
-    if (fs::is_directory(file)) return read_series(file, measured, run);
-    const bool turned = !measured.image_frame.empty();
-    segmentation::ImageFile volume = segmentation::read_image(run.input(file), turned ? "LPS" : measured.frame);
-    if (turned && volume.frame.empty())
-      volume.image.grid = in_lps(volume.image.grid, *axes_of_frame(measured.image_frame));
-    if (const auto voxels = segmentation::detached_data_file(file)) run.input(*voxels);
-    for (const auto& warning : volume.warnings) run.warn(warning);
-    return volume;
-  }
-
-  /// A DICOM series, checked against what the case says about the patient.
-  static segmentation::ImageFile read_series(const fs::path& folder, const Case& measured, Run& run) {
-    segmentation::DicomVolume volume = segmentation::read_dicom(folder, measured.image_series);
-    for (const fs::path& file : volume.series.files) run.input(file);
-    const std::string& position = volume.series.patient_position;
-    const bool prone = position == "HFP" || position == "FFP", supine = position == "HFS" || position == "FFS";
-    const double falls_back = measured.pose("prone").gravity.y();  // LPS: +y is the patient's back
-    if ((prone && falls_back > 0) || (supine && falls_back < 0))
-      throw InputError(fmt::format(
-          "{}: the series was taken with the patient {} (patient position {}), but [pose.prone] gravity in case.toml "
-          "points to the patient's {}; choose the series of the prone examination, or correct gravity or frame",
-          folder.string(), prone ? "prone" : "supine", position, falls_back > 0 ? "back" : "front"));
-    if (position.empty()) run.warn("the series does not say how the patient lay (0018,5100)");
-    const std::string side = volume.series.laterality == "L" ? "left" : volume.series.laterality == "R" ? "right" : "";
-    if (!side.empty() && measured.side != side)
-      throw InputError(fmt::format("{}: the series shows the {} breast only (laterality {}), but case.side is \"{}\"",
-                                   folder.string(), side, volume.series.laterality, measured.side));
-    for (const auto& warning : volume.file.warnings) run.warn(warning);
-    return std::move(volume.file);
+  static void list_recipes() {
+    for (const auto& recipe : segmentation::shipped_recipes()) fmt::print("{:<16}{}\n", recipe.name, recipe.about);
+    throw CLI::Success();
   }
 
   segmentation::Recipe find_recipe(const Case& measured, Run& run) const {
-    if (!recipe_file_.empty()) return segmentation::read_recipe_file(run.input(recipe_file_), measured.frame);
+    using Side = segmentation::Planes::Side;
+    segmentation::Recipe recipe = named_recipe(measured, run);
+    recipe.set_side(measured.side == "left" ? Side::left : measured.side == "right" ? Side::right : Side::both);
+    return recipe;
+  }
+
+  segmentation::Recipe named_recipe(const Case& measured, Run& run) const {
+    if (segmentation::shipped_recipe(recipe_)) return segmentation::read_shipped_recipe(recipe_, measured.frame);
+    if (!recipe_.empty() && !fs::exists(recipe_))
+      throw InputError(fmt::format("--recipe {}: no such file, and no recipe of that name; {}", recipe_,
+                                   suggestion(recipe_, segmentation::recipe_names())));
+    if (!recipe_.empty()) return segmentation::read_recipe_file(run.input(recipe_), measured.frame);
     if (measured.recipe) return *measured.recipe;
-    throw InputError(fmt::format("{}: image.kind = \"mri\" needs a [segmentation] table in case.toml, or --recipe FILE",
-                                 (measured.folder / "case.toml").string()));
+    throw InputError(fmt::format(
+        "{}: image.kind = \"mri\" needs a recipe: add [segmentation] with recipe = \"t1_auto\" (supine-segment "
+        "--recipes lists them) or steps to case.toml, or give --recipe NAME or FILE",
+        (measured.folder / "case.toml").string()));
   }
 
   static void check(const Case& measured, const LabelImage& labels) {
@@ -218,7 +223,7 @@ class SegmentTool : public Tool {
     if (measured.labels.empty())
       throw InputError(
           fmt::format("--truth {}: case.toml has no table [image.labels] to map its values by", truth_file_));
-    const auto volume = read_volume(truth_file_, measured, run);
+    const auto volume = read_case_volume(run, measured, truth_file_);
     return segmentation::dice(labels, segmentation::map_labels(volume.image, measured.labels, truth_file_).image);
   }
 
@@ -260,6 +265,11 @@ class SegmentTool : public Tool {
     json["meshed_components"] = findings.components.meshed;
     json["meshed_volume_ml"] = volume_ml(grid, meshed(findings.voxels));
     if (!findings.recipe_log.empty()) json["recipe"] = findings.recipe_log;
+    for (const auto& doubt : findings.doubts)
+      json["doubts"].push_back({{"what", doubt.what}, {"place_mm", numbers(doubt.place_mm)}});
+    if (!findings.gland_share.empty())
+      json["gland_by_share_ml"] = std::accumulate(findings.gland_share.begin(), findings.gland_share.end(), 0.0) *
+                                  grid.voxel_volume_mm3() / 1000;
     fill_sides(json, grid, findings);
     if (!findings.dice) return;
     for (int t = 0; t < tissue_count; ++t)
@@ -304,6 +314,27 @@ class SegmentTool : public Tool {
     }
   }
 
+  /// Says what does not look right, and draws its place beside the labels.
+  Outcome doubtful(const Findings& findings, const LabelImage& labels, const fs::path& target, Run& run) const {
+    constexpr std::array<const char*, 3> views{"axial", "sagittal", "coronal"};
+    for (std::size_t n = 0; n < findings.doubts.size(); ++n) {
+      const segmentation::Doubt& doubt = findings.doubts[n];
+      const auto pictures = segmentation::pictures_of(doubt, labels, grey_);
+      std::string files;
+      for (std::size_t view = 0; view < views.size(); ++view) {
+        const fs::path file =
+            target.parent_path() / fmt::format("{}_doubt_{}_{}.png", target.stem().string(), n + 1, views[view]);
+        segmentation::write_png(pictures[view], run.output(file));
+        if (view == 0) files = file.string();
+        run.figures(file)["place_mm"] = numbers(doubt.place_mm);
+      }
+      const Eigen::Vector3d& at = doubt.place_mm;
+      run.warn(fmt::format("in doubt at ({:.0f}, {:.0f}, {:.0f}) mm: {} (see {})", at.x(), at.y(), at.z(), doubt.what,
+                           files));
+    }
+    return findings.doubts.empty() ? Outcome::done : Outcome::target_not_met;
+  }
+
   static double volume_ml(const Grid& grid, std::size_t voxels) {
     return static_cast<double>(voxels) * grid.voxel_volume_mm3() / 1000;
   }
@@ -314,7 +345,7 @@ class SegmentTool : public Tool {
     return sum;
   }
 
-  std::string case_folder_, recipe_file_, truth_file_, overlay_folder_;
+  std::string case_folder_, recipe_, truth_file_, overlay_folder_;
   segmentation::OverlayOptions overlay_options_;
   GreyImage grey_;  ///< the volume as read, for the pictures; empty for kind = "labels"
 };

@@ -7,8 +7,10 @@
 #include "common/error.h"
 #include "common/landmarks.h"
 #include "common/rms.h"
+#include "meshing/imaged_mesh.h"
 #include "meshing/mesh_io.h"
 #include "pipeline/case/case.h"
+#include "pipeline/case/model_checks.h"
 #include "pipeline/case/model_edit.h"
 #include "pipeline/case/model_file.h"
 #include "pipeline/tool/tool.h"
@@ -66,9 +68,10 @@ class SimulateTool : public Tool {
   std::string name() const override { return "supine-simulate"; }
 
   std::string summary() const override {
-    return "Finds the gravity-free (undeformed) shape of the prone breast and from it the shape in every other pose of "
+    return "Finds the gravity-free (undeformed) shape of the imaged body and from it the shape in every other pose of "
            "the case.\n"
-           "Writes prone.vtu, undeformed.vtu, supine.vtu (and the case's other poses), the organ surfaces and "
+           "Writes prone.vtu (the imaged pose), undeformed.vtu, supine.vtu (and the case's other poses), the organ "
+           "surfaces and "
            "landmarks "
            "in each pose. -o names their folder (default: that of the mesh).\n\n"
            "Examples:\n"
@@ -173,11 +176,13 @@ class SimulateTool : public Tool {
     run.input(case_folder_ / "case.toml");
     Inputs in{read_case(case_folder_), {}, {}, {}, {}};
     in.model = read_model(run.input(model_file_.empty() ? case_folder_ / "model.toml" : model_file_));
-    in.mesh = meshing::read_mesh(run.input(mesh_file_));
-    in.anatomy = meshing::compute_anatomy(in.mesh, in.measured.side);
+    in.mesh = meshing::read_imaged_mesh(run.input(mesh_file_), in.measured.side);
+    in.anatomy = meshing::compute_anatomy(in.mesh, in.measured.side, in.measured.imaged_pose);
+    if (!in.measured.is_object())
+      check_weight(in.model, in.anatomy, model_file_.empty() ? case_folder_ / "model.toml" : model_file_);
     for (const std::string& wanted : pose_names_) in.measured.pose(wanted);
     for (const Pose& pose : in.measured.poses)
-      if (pose.name == "prone" || pose_names_.empty() ||
+      if (pose.name == in.measured.imaged_pose || pose_names_.empty() ||
           std::find(pose_names_.begin(), pose_names_.end(), pose.name) != pose_names_.end())
         in.loads.push_back({pose.name, pose.gravity});
     return in;
@@ -241,9 +246,12 @@ class SimulateTool : public Tool {
       return file;
     };
     const Eigen::VectorXd error = (solution.round_trip.x - solution.prone).rowwise().norm();
-    const fs::path prone = write_shape("prone", solution.prone, {{"round_trip_error_mm", error}});
+    const bool free_of_load = in.measured.imaged_pose == simulation::free_of_load;
     const fs::path undeformed = write_shape("undeformed", solution.X, {});
-    run.figures(prone) = figures(in, solution, solution.round_trip.report, in.mesh.points);
+    if (!free_of_load) {
+      const fs::path imaged = write_shape(in.measured.imaged_pose, solution.prone, {{"round_trip_error_mm", error}});
+      run.figures(imaged) = figures(in, solution, solution.round_trip.report, in.mesh.points);
+    }
     run.figures(undeformed) = figures(in, solution, solution.inverse, solution.X);
     for (const PoseSolution& pose : solution.poses) {
       const fs::path file = write_shape(pose.name, pose.x, {});
@@ -279,7 +287,7 @@ class SimulateTool : public Tool {
     const Eigen::VectorXd from_prone = (x - in.mesh.points).rowwise().norm();
     const Eigen::VectorXd from_undeformed = (x - solution.X).rowwise().norm();
     Json f;
-    f["inverse"] = inverse_;
+    f["inverse"] = in.measured.imaged_pose == simulation::free_of_load ? "none: imaged free of load" : inverse_;
     f["round_trip_max_mm"] = solution.round_trip_max_mm;
     f["round_trip_rms_mm"] = solution.round_trip_rms_mm;
     f["newton_iterations"] = report.newton_iterations;
@@ -298,7 +306,7 @@ class SimulateTool : public Tool {
       if (point < 0) return nullptr;
       return {x(point, 0), x(point, 1), x(point, 2)};
     };
-    if (in.anatomy.breasts.empty()) f["nipple_mm"] = place(in.anatomy.nipple_point);
+    if (in.anatomy.breasts.empty() && !in.anatomy.is_object()) f["nipple_mm"] = place(in.anatomy.nipple_point);
     for (const meshing::Anatomy& one : in.anatomy.breasts) f["nipple_mm"][one.side] = place(one.nipple_point);
     f["load_number"] = simulation::load_number(in.anatomy, in.model);
     f["nodes"] = in.mesh.points.rows();
@@ -310,6 +318,7 @@ class SimulateTool : public Tool {
   }
 
   void say(Run& run, const Inputs& in, const ChainSolution& solution) const {
+    const std::string& imaged = in.measured.imaged_pose;
     const auto row = [&](const std::string& what, const simulation::SolveReport& report, const Points& x) {
       const Eigen::VectorXd moved = (x - in.mesh.points).rowwise().norm();
       run.say(fmt::format("  {:<24}{:>8.2f}{:>8.2f}{:>8}{:>8}{:>10.3f}", what, rms(moved), moved.maxCoeff(),
@@ -317,11 +326,13 @@ class SimulateTool : public Tool {
     };
     run.say(fmt::format("{} nodes, {} tetrahedra of order {}; load number ρgH/E = {:.2f}", in.mesh.points.rows(),
                         in.mesh.cells.rows(), in.mesh.order(), simulation::load_number(in.anatomy, in.model)));
-    run.say(fmt::format("  {:<24}{:>8}{:>8}{:>8}{:>8}{:>10}", "moved from prone, mm", "rms", "max", "Newton", "steps",
-                        "min det F"));
+    run.say(fmt::format("  {:<24}{:>8}{:>8}{:>8}{:>8}{:>10}", "moved from " + imaged + ", mm", "rms", "max", "Newton",
+                        "steps", "min det F"));
     row("undeformed", solution.inverse, solution.X);
     for (const PoseSolution& pose : solution.poses) row(pose.name, pose.report, pose.x);
-    run.say(fmt::format("  round trip undeformed → prone: {:.2e} mm at most (bound {:.0e}), {} Newton steps",
+    if (imaged == simulation::free_of_load)
+      return run.say("  imaged free of load: its shape is the undeformed one, there is no inverse and no round trip");
+    run.say(fmt::format("  round trip undeformed → {}: {:.2e} mm at most (bound {:.0e}), {} Newton steps", imaged,
                         solution.round_trip_max_mm, round_trip_bound_mm, solution.round_trip.report.newton_iterations));
   }
 

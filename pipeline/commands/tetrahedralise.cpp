@@ -14,8 +14,10 @@
 #include "meshing/tetrahedra/curve.h"
 #include "meshing/tetrahedra/grade.h"
 #include "meshing/tetrahedra/ligament_ring.h"
+#include "meshing/tetrahedra/part_fractions.h"
 #include "meshing/tetrahedra/tissue_fractions.h"
 #include "meshing/topology.h"
+#include "pipeline/case/body_places.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/results/mesh_report.h"
 #include "pipeline/tool/tool.h"
@@ -49,6 +51,7 @@ class TetrahedraliseTool : public Tool {
            "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --interface gland=gland_coarse.vtp\n"
            "  supine-tetrahedralise coarse.vtp muscle.vtp labels.vti --error-from supine.vtu --cells 20000 -o "
            "fine.vtu\n"
+           "  supine-tetrahedralise coarse.vtp muscle.vtp --case samples/silicone_bar/e --order 2\n"
            "  supine-tetrahedralise --check mesh.vtu -o report.json\n";
   }
 
@@ -57,6 +60,8 @@ class TetrahedraliseTool : public Tool {
         ->required();
     app.add_option("muscle", muscle_, "breast-facing muscle sheet (.vtp)");
     app.add_option("labels", labels_, "label volume (.vti)");
+    app.add_option("--case", case_folder_,
+                   "the case, where its image is a surface: names supports and parts; there are no labels then");
     app.add_option("--order", order_, "1: linear, 2: quadratic tetrahedra")->check(CLI::IsMember({1, 2}));
     app.add_option(
         "--fine", fine_,
@@ -111,14 +116,19 @@ class TetrahedraliseTool : public Tool {
 
  private:
   TetMesh make_mesh(Run& run, MeshFindings& findings) const {
-    if (muscle_.empty() || labels_.empty()) {
-      throw InputError("three files are needed: SURFACE.vtp MUSCLE.vtp LABELS.vti (or --check MESH.vtu)");
+    if (muscle_.empty() || (labels_.empty() && case_folder_.empty())) {
+      throw InputError(
+          "three files are needed: SURFACE.vtp MUSCLE.vtp LABELS.vti (or --check MESH.vtu; or two and --case "
+          "where the image is a surface)");
     }
+    std::optional<Case> body;
+    if (!case_folder_.empty()) body = read_body(run);
     run.stage("read");
     reconstruction::Surface surface = reconstruction::read_surface(run.input(surface_));
     const reconstruction::Surface muscle = reconstruction::read_surface(run.input(muscle_));
-    const segmentation::LabelImage labels = segmentation::read_labels(run.input(labels_));
-    findings.side = find_side();
+    segmentation::LabelImage labels;
+    if (!body) labels = segmentation::read_labels(run.input(labels_));
+    findings.side = body ? body->side : find_side();
     run.stage("tetrahedra");
     run.progress("filling the surface with tetrahedra");
     meshing::TetrahedraliseOptions options = options_;
@@ -136,7 +146,11 @@ class TetrahedraliseTool : public Tool {
     bend(run, mesh, findings);
     run.stage("tissue");
     run.progress("reading tissue fractions from the labels");
-    findings.fractions = meshing::assign_tissue(mesh, labels);
+    if (body)
+      name_places(run, *body, mesh, findings);
+    else
+      findings.fractions = meshing::assign_tissue(mesh, labels, segmentation::read_gland_share(labels_));
+    if (!body && findings.side == "none") name_one_support(mesh);
     if (!inside.interfaces.empty()) meshing::impose_interfaces(mesh, enclosing, inside.interfaces);
     run.stage("anatomy");
     run.progress("finding the foot of the mound");
@@ -145,6 +159,35 @@ class TetrahedraliseTool : public Tool {
     meshing::check_mesh(mesh);
     findings.quality = meshing::measure_quality(mesh);
     return mesh;
+  }
+
+  Case read_body(Run& run) const {
+    run.input(case_folder_ / "case.toml");
+    Case measured = read_case(case_folder_);
+    if (measured.image_kind != "surface")
+      throw InputError(fmt::format("--case {}: [image] kind is \"{}\"; give labels.vti instead", case_folder_.string(),
+                                   measured.image_kind));
+    if (!labels_.empty())
+      throw InputError("--case stands for the labels of a body that came as a surface: give one of them");
+    return measured;
+  }
+
+  static void name_places(Run& run, const Case& body, TetMesh& mesh, MeshFindings& findings) {
+    meshing::assign_supports(mesh, read_supports(run, body));
+    meshing::assign_parts(mesh, read_parts(run, body));
+    for (std::size_t p = 0; p < mesh.part_names.size(); ++p) {
+      double volume = 0;
+      for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c)
+        volume +=
+            mesh.part_fraction(c, static_cast<Eigen::Index>(p)) * meshing::cell_volume_mm3(mesh.points, mesh.cells, c);
+      findings.parts_ml.emplace_back(mesh.part_names[p], volume / 1000);
+    }
+  }
+
+  /// What a label map calls support or muscle is the one support of an object.
+  static void name_one_support(TetMesh& mesh) {
+    mesh.support_names = {"support"};
+    mesh.muscle_support = Eigen::VectorXi::Zero(mesh.muscle.triangles.rows());
   }
 
   std::vector<meshing::Interface> read_interfaces(Run& run) const {
@@ -190,8 +233,9 @@ class TetrahedraliseTool : public Tool {
       side = notes.contains("side") ? notes.at("side") : "left";
       from = labels_;
     }
-    if (side != "left" && side != "right" && side != "both") {
-      throw InputError(fmt::format("{}: side is \"{}\"; left, right or both is expected", from, side));
+    if (side != "left" && side != "right" && side != "both" && side != "none") {
+      throw InputError(
+          fmt::format("{}: side is \"{}\"; left, right, both or (of an object) none is expected", from, side));
     }
     return side;
   }
@@ -199,6 +243,7 @@ class TetrahedraliseTool : public Tool {
   void mark_ring(Run& run, TetMesh& mesh, MeshFindings& findings) const {
     try {
       findings.anatomy = meshing::compute_anatomy(mesh, findings.side);
+      if (findings.anatomy->is_object()) return;
       if (meshing::mark_ligament_ring(mesh, *findings.anatomy) == 0) {
         run.warn(fmt::format("no inner face lies within {} mm of the mound's foot; no ligament ring is marked",
                              meshing::ligament_half_width_mm));
@@ -253,7 +298,7 @@ class TetrahedraliseTool : public Tool {
   }
 
   std::string surface_, muscle_, labels_, side_, fine_, error_from_;
-  fs::path png_;
+  fs::path png_, case_folder_;
   std::vector<std::string> interfaces_;
   meshing::TetrahedraliseOptions options_;
   meshing::CurveOptions curving_;

@@ -199,10 +199,12 @@ void draw_distances(const fs::path& file, const std::string& title, const std::s
   blank_uncovered(*skin);
   const auto colours = diverging(colour_range_mm(sizes_of(*skin)));
   const auto marks = hot_spots(*skin);
-  const std::vector<const View*> views = views_of(side);
   double bounds[6];
   skin->GetBounds(bounds);
-  const std::vector<double> shares = shares_of(views, bounds);
+  const View flat = object_view(bounds, false), edge = object_view(bounds, true);
+  const std::vector<const View*> views = side == "none" ? std::vector<const View*>{&flat, &edge} : views_of(side);
+  const std::vector<double> shares =
+      side == "none" ? std::vector<double>{0.6 * panes_share, 0.4 * panes_share} : shares_of(views, bounds);
   Sheet sheet(title);
   double from = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {

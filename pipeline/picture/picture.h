@@ -27,7 +27,7 @@ void announce_png(Run& run, const std::filesystem::path& file, const std::filesy
 /// the outer side of every breast; grey where `covered` is 0. The largest errors are marked in mm.
 /// @param file   of calibration::write_comparison() or diagnosis::write_error_map()
 /// @param title  above the picture
-/// @param side   left, right or both
+/// @param side   left, right or both; none: an object, seen along the two short sides of its box
 /// @throws InputError  no display, no such array, not writable
 void draw_distances(const std::filesystem::path& file, const std::string& title, const std::string& side,
                     const std::filesystem::path& png);
@@ -40,6 +40,7 @@ void draw_mesh(const std::filesystem::path& file, const std::string& title, cons
 struct Placed {
   reconstruction::Surface body;           ///< only its triangles are drawn
   reconstruction::Surface before, after;  ///< the scan; triangles or bare points
+  bool object = false;                    ///< no patient: seen along the short sides of its box
 };
 /// Body grey, scan orange where given, blue where found; from the front and from the left.
 /// @throws InputError  as above

@@ -76,7 +76,9 @@ void draw_placement(const Placed& placed, const std::string& title, const std::f
   widen(placed.before.points, bounds);
   widen(placed.after.points, bounds);
   Sheet sheet(title);
-  const std::pair<const View*, std::pair<double, double>> places[] = {{&front, {0, 0.42}}, {&from_left, {0.42, 0.84}}};
+  const View flat = object_view(bounds, false), edge = object_view(bounds, true);
+  const std::pair<const View*, std::pair<double, double>> places[] = {
+      {placed.object ? &flat : &front, {0, 0.42}}, {placed.object ? &edge : &from_left, {0.42, 0.84}}};
   for (const auto& [view, across] : places) {
     vtkRenderer& pane = sheet.pane(across.first, 0, across.second, 0.93);
     add_surface(pane, placed.body, body_grey, 1);

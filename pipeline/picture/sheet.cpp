@@ -18,7 +18,9 @@
 #include <vtkTextProperty.h>
 #include <vtkWindowToImageFilter.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "common/error.h"
@@ -109,6 +111,21 @@ void fill(vtkRenderer& pane, const std::vector<Bar>& bars, const Colour& colour)
 const View front = {"from the front", {0, -1, 0}, "R", "L"}, behind = {"from behind", {0, 1, 0}, "L", "R"},
            from_left = {"from the left", {1, 0, 0}, "A", "P"}, from_right = {"from the right", {-1, 0, 0}, "P", "A"};
 
+View object_view(const double bounds[6], bool second) {
+  std::array<int, 3> axes = {0, 1, 2};
+  const auto length = [bounds](int axis) { return bounds[2 * axis + 1] - bounds[2 * axis]; };
+  std::sort(axes.begin(), axes.end(), [&](int a, int b) { return length(a) < length(b); });
+  const int from = axes[second ? 1 : 0], up = from == 1 ? 2 : (from == 2 ? 1 : 2), across = 3 - from - up;
+  static const char* const plus[] = {"+x", "+y", "+z"};
+  static const char* const minus[] = {"-x", "-y", "-z"};
+  static const char* const names[] = {"from +x", "from +y", "from +z"};
+  View view{names[from], Eigen::Vector3d::Unit(from), minus[across], plus[across], Eigen::Vector3d::Unit(up), plus[up],
+            minus[up]};
+  // The right of the picture is up × from: where that is the negative axis the letters change places.
+  if (view.up.cross(view.from)[across] < 0) std::swap(view.left, view.right);
+  return view;
+}
+
 void look(vtkRenderer& pane, const View& view, const double bounds[6]) {
   vtkCamera* camera = pane.GetActiveCamera();
   const Eigen::Vector3d centre(0.5 * (bounds[0] + bounds[1]), 0.5 * (bounds[2] + bounds[3]),
@@ -117,16 +134,21 @@ void look(vtkRenderer& pane, const View& view, const double bounds[6]) {
   camera->ParallelProjectionOn();
   camera->SetFocalPoint(centre.data());
   camera->SetPosition(eye.data());
-  camera->SetViewUp(0, 0, 1);
-  const double across = std::abs(view.from.y()) > 0.5 ? bounds[1] - bounds[0] : bounds[3] - bounds[2];
+  camera->SetViewUp(view.up.data());
+  const auto length = [bounds](const Eigen::Vector3d& axis) {
+    Eigen::Index row = 0;
+    axis.cwiseAbs().maxCoeff(&row);
+    return bounds[2 * row + 1] - bounds[2 * row];
+  };
+  const double across = length(view.up.cross(view.from));
   const int* size = pane.GetSize();
   const double shape = static_cast<double>(size[0]) / std::max(1, size[1]);
-  camera->SetParallelScale(0.62 * std::max(bounds[5] - bounds[4], across / shape));
+  camera->SetParallelScale(0.62 * std::max(length(view.up), across / shape));
   pane.ResetCameraClippingRange();
   write_text(pane, view.left, 0.02, 0.5, {.size = title_size, .across = Across::left});
   write_text(pane, view.right, 0.98, 0.5, {.size = title_size, .across = Across::right});
-  write_text(pane, "H", 0.5, 0.99, {.size = title_size, .up = Up::top});
-  write_text(pane, "F", 0.5, 0.07, {.size = title_size, .up = Up::bottom});
+  write_text(pane, view.top, 0.5, 0.99, {.size = title_size, .up = Up::top});
+  write_text(pane, view.bottom, 0.5, 0.07, {.size = title_size, .up = Up::bottom});
   write_text(pane, view.name, 0.5, 0.01, {.up = Up::bottom});
 }
 

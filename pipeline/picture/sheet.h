@@ -62,7 +62,11 @@ struct View {
   const char* name;
   Eigen::Vector3d from;  ///< patient LPS
   const char *left, *right;
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  const char *top = "H", *bottom = "F";
 };
+/// Of an object: along the shortest side of its box (x, y, z, each from and to; mm), and along the next.
+View object_view(const double bounds[6], bool second);
 extern const View front, behind, from_left, from_right;
 
 /// Sets up the pane's camera for a body within @p bounds (x, y, z, each from and to; mm) and writes the letters.

@@ -40,12 +40,13 @@ const Json* candidate(const Json& diagnosis, const std::string& effect) {
   return nullptr;
 }
 
-Json error_of(const Collected& collected) {
+Json error_of(const Case& measured, const Collected& collected) {
   struct Row {
-    const char *file, *whose;
+    std::string file;
+    const char* whose;
   };
-  for (const Row& row :
-       {Row{"calibrated/comparison.json", "calibrated model"}, {"comparison.json", "model as given"}}) {
+  const std::string file = Case::file_of("comparison", measured.predicted().name, ".json");
+  for (const Row& row : {Row{"calibrated/" + file, "calibrated model"}, {file, "model as given"}}) {
     const Json& found = collected.find(row.file);
     if (found.is_null()) continue;
     return {{"rms_mm", found.value("rms_mm", Json())},
@@ -160,7 +161,7 @@ void add_facts(const Json& diagnosis, const Collected& collected, Answer& answer
 Answer answer_of(const Case& measured, const Collected& collected, const std::vector<Stage>& stages,
                  const Places& places) {
   Answer answer;
-  answer.error = error_of(collected);
+  answer.error = error_of(measured, collected);
   const Json& diagnosis = collected.first({"diagnosis.json", "ladder/diagnosis.json"});
   if (!diagnosis.is_null()) {
     tell_diagnosis(diagnosis, places, answer);
@@ -171,19 +172,25 @@ Answer answer_of(const Case& measured, const Collected& collected, const std::ve
                                     [](const Pose& pose) { return pose.surface.has_value(); });
   const auto gap = std::find_if(stages.begin(), stages.end(),
                                 [](const Stage& stage) { return stage.file.empty() && stage.name != "sensitivity"; });
-  if (collected.find("supine.json").is_null()) {
+  const std::string pose = measured.predicted().name;
+  if (collected.find(pose + ".json").is_null()) {
     answer.kind = "no_shape";
-    answer.sentence = "The supine shape has not been computed yet.";
+    answer.sentence = fmt::format("The {} shape has not been computed yet.", pose);
     answer.next = gap == stages.end() ? "" : fmt::format("The next step is {}.", gap->name);
     answer.command = places.make("simulate");
   } else if (!has_scan) {
     answer.kind = "no_scan";
-    answer.sentence = "The supine shape is predicted; without a measured surface nobody knows how far it is off.";
-    answer.next = "Measure the patient lying supine and name the scan as `surface` in [pose.supine] of case.toml.";
+    answer.sentence =
+        fmt::format("The {} shape is predicted; without a measured surface nobody knows how far it is off.", pose);
+    answer.next =
+        measured.is_object()
+            ? fmt::format("Measure the body in that pose and name the scan as `surface` in [pose.{}] of case.toml.",
+                          pose)
+            : "Measure the patient lying supine and name the scan as `surface` in [pose.supine] of case.toml.";
   } else {
     answer.kind = "not_diagnosed";
     answer.sentence = answer.error.is_null()
-                          ? "The supine shape is predicted, not compared with the measured surface yet."
+                          ? fmt::format("The {} shape is predicted, not compared with the measured surface yet.", pose)
                           : fmt::format(
                                 "The {} lies {:.2f} mm RMS from the measured surface; what it lacks has not "
                                 "been asked yet.",

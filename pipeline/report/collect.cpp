@@ -34,13 +34,14 @@ Json read_figures(const fs::path& file) {
 }
 
 std::vector<std::string> sidecar_names(const Case& measured) {
-  std::vector<std::string> names = {"labels.json", "breast.json",  "muscle.json",      "coarse.json",
-                                    "mesh.json",   "prone.json",   "undeformed.json",  "calibration.json",
-                                    "model.json",  "history.json", "sensitivity.json", "diagnosis.json",
+  std::vector<std::string> names = {"labels.json",     "breast.json",      "muscle.json",
+                                    "coarse.json",     "mesh.json",        measured.imaged_pose + ".json",
+                                    "undeformed.json", "calibration.json", "model.json",
+                                    "history.json",    "sensitivity.json", "diagnosis.json",
                                     "ladder.json"};
   for (const Pose& pose : measured.poses) {
     const std::string end = pose.name == "supine" ? ".json" : "_" + pose.name + ".json";
-    if (pose.name != "prone") names.push_back(pose.name + ".json");
+    if (pose.name != measured.imaged_pose) names.push_back(pose.name + ".json");
     names.push_back("comparison" + end);
     names.push_back("scan" + end);
   }

@@ -151,7 +151,7 @@ class Gatherer {
     entry["poses"] = Json::object();
     for (const Pose& pose : case_.poses) {
       const fs::path file = state.folder / (pose.name + ".vtu");
-      if (pose.name == "prone" || !fs::exists(file)) continue;
+      if (pose.name == case_.imaged_pose || !fs::exists(file)) continue;
       const auto x = positions(file);
       if (!x) continue;
       entry["poses"][pose.name] = shape(*x);

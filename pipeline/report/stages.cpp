@@ -102,6 +102,13 @@ std::string stale(const std::string& sidecar, const Json& figures, const Places&
   return {};
 }
 
+/// The file of the pose that is predicted, where a row names that of supine.
+std::string of_predicted(const Case& measured, const std::string& file) {
+  const std::string& pose = measured.predicted().name;
+  if (file == "supine.json") return pose + ".json";
+  return file == "comparison.json" ? Case::file_of("comparison", pose, ".json") : file;
+}
+
 bool has_scan(const Case& measured) {
   return std::any_of(measured.poses.begin(), measured.poses.end(),
                      [](const Pose& pose) { return pose.surface.has_value(); });
@@ -118,15 +125,21 @@ std::vector<Stage> stages_of(const Case& measured, const Collected& collected, c
   std::vector<Stage> stages;
   for (const StageRow& row : stage_rows) {
     Stage stage{row.name, row.shows, {}, {}, {}, {}};
-    for (const char* file : row.files)
-      if (stage.file.empty() && !collected.find(file).is_null()) stage.file = file;
+    if (stage.name == "segment" && measured.image_kind == "surface") continue;
+    if (stage.name == "simulate" && measured.predicted().name != "supine")
+      stage.shows = "undeformed shape and shape in every pose, round trip";
+    for (const char* file : row.files) {
+      const std::string own = of_predicted(measured, file);
+      if (stage.file.empty() && !collected.find(own).is_null()) stage.file = own;
+    }
     if (!stage.file.empty()) {
       const Json& figures = collected.find(stage.file);
       const fs::path folder = fs::path(places.out_name) / fs::path(stage.file).parent_path();
       stage.command = command_of(figures, places, (folder / "").parent_path().generic_string());
       stage.stale = stale(stage.file, figures, places);
     } else if (row.needs_scan && !has_scan(measured)) {
-      stage.fill = "a measured surface: name it as `surface` in [pose.supine] of case.toml";
+      stage.fill =
+          fmt::format("a measured surface: name it as `surface` in [pose.{}] of case.toml", measured.predicted().name);
     } else if (std::string(row.target).empty()) {
       stage.fill = fmt::format("build/bin/supine-sensitivity {} {}/mesh.vtu", places.case_name, places.out_name);
     } else {

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/tissue_range.h"
+
 namespace supine::pipeline {
 namespace {
 
@@ -25,6 +27,7 @@ Json figures_json(const DistanceFigures& f) {
 
 Json parameters_json(const FreeParameters& parameters, const CalibrationResult& result) {
   Json list = Json::array();
+  const auto outside = calibration::outside_tissue(parameters, result.fit.u);
   for (Eigen::Index i = 0; i < parameters.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     list.push_back({{"name", parameters.names()[k]},
@@ -32,7 +35,8 @@ Json parameters_json(const FreeParameters& parameters, const CalibrationResult& 
                     {"unit", parameters.unit(i)},
                     {"start", parameters.value(i, parameters.start()[i])},
                     {"interval95", {result.intervals[k].low, result.intervals[k].high}},
-                    {"at_bound", parameters.at_bound(result.fit.u, i)}});
+                    {"at_bound", parameters.at_bound(result.fit.u, i)},
+                    {"outside_tissue", std::find(outside.begin(), outside.end(), i) != outside.end()}});
   }
   return list;
 }
@@ -50,11 +54,16 @@ Json worth_json(const FreeParameters& parameters, const CalibrationResult& resul
   for (const auto& pair : u.not_told_apart)
     pairs.push_back({{"first", pair.first}, {"second", pair.second}, {"correlation", pair.correlation}});
   Json coordinates = Json::array();
-  for (Eigen::Index i = 0; i < sd.size(); ++i)
+  for (Eigen::Index i = 0; i < sd.size(); ++i) {
+    const auto& prior = parameters.priors()[static_cast<std::size_t>(i)];
     coordinates.push_back({{"name", parameters.names()[static_cast<std::size_t>(i)]},
                            {"coordinate", parameters.is_log(i) ? "ln(value)" : "value, scaled"},
                            {"sd", sd[i]},
-                           {"sd_if_points_erred_alone", std::sqrt(u.white(i, i))}});
+                           {"sd_if_points_erred_alone", std::sqrt(u.white(i, i))},
+                           {"at", result.fit.u[i]},
+                           {"prior_mean", prior ? Json(prior->mean) : Json(nullptr)},
+                           {"prior_sd", prior ? Json(prior->sd) : Json(nullptr)}});
+  }
   return {{"rank", u.rank},
           {"coordinates", coordinates},
           {"correlation", correlation},
@@ -72,6 +81,15 @@ std::vector<std::string> calibration_remarks(const FreeParameters& parameters, c
       remarks.push_back(
           fmt::format("{} ended at an end of its range ({:.4g} {}): the data pull it further, or say nothing about it",
                       names[static_cast<std::size_t>(i)], parameters.value(i, result.fit.u[i]), parameters.unit(i)));
+  for (const Eigen::Index i : calibration::outside_tissue(parameters, result.fit.u)) {
+    const std::string& name = names[static_cast<std::size_t>(i)];
+    const calibration::TissueRange range = calibration::tissue_range(name).value();
+    remarks.push_back(fmt::format(
+        "{} = {:.3g} kPa is no modulus that tissue has ({:g} to {:g} kPa): it makes up for something else. Look "
+        "whether "
+        "the scan lies where it should (--scan-offset, supine-register), and at what the model lacks (supine-diagnose)",
+        name, parameters.value(i, result.fit.u[i]), range.softest_kpa, range.stiffest_kpa));
+  }
   for (const auto& pair : result.uncertainty.not_told_apart)
     remarks.push_back(fmt::format("{} and {} cannot be told apart here (correlation {:.3f}): {}", pair.first,
                                   pair.second, pair.correlation,

@@ -9,6 +9,7 @@
 #include "common/rms.h"
 #include "common/statistics.h"
 #include "diagnosis/diagnosis_file.h"
+#include "simulation/parameters.h"
 
 namespace supine::pipeline {
 namespace {
@@ -98,6 +99,51 @@ Json hypotheses_json(const Findings& found) {
                     {"refitted", one->refitted || one->effects.empty()},
                     {"unexplained_mm", left.mean_mm},
                     {"unexplained95", {left.low_mm, left.high_mm}}});
+  return list;
+}
+
+/// Every effect by itself, as the evidence of many patients is put together from (cohort/population.h): posterior and
+/// prior of its numbers, as offsets from the null, and how far the usual size of one moves the fitted points.
+Json singles_json(const Findings& found) {
+  const auto nothing = std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
+                                    [](const diagnosis::Hypothesis& h) { return h.effects.empty(); });
+  Json list = Json::array();
+  for (const diagnosis::Hypothesis& h : found.hypotheses) {
+    if (h.effects.size() != 1) continue;
+    const diagnosis::Candidate& candidate = found.candidates[static_cast<std::size_t>(h.effects.front())];
+    const Refit* refit = found.refit_of({candidate.effect});
+    Json numbers = Json::array();
+    for (std::size_t k = 0; k < candidate.parameters.size(); ++k) {
+      const diagnosis::CandidateParameter& p = candidate.parameters[k];
+      const auto prior = diagnosis::strength_prior(*simulation::find_parameter(p.name));
+      std::pair<double, double> known;
+      const int place = h.place_of(p.name);
+      if (refit != nullptr && refit->solved) {
+        const auto fitted = std::find_if(refit->parameters.begin(), refit->parameters.end(),
+                                         [&p](const diagnosis::FittedParameter& f) { return f.name == p.name; });
+        if (fitted == refit->parameters.end()) continue;
+        known = {fitted->value - p.null, (fitted->high - fitted->low) / (2 * normal_reach95())};
+      } else if (place >= 0) {
+        known = h.weighed.number(place);
+      } else {
+        continue;
+      }
+      const Eigen::VectorXd usual =
+          candidate.secant.size() > 0
+              ? candidate.secant
+              : Eigen::VectorXd(candidate.slope.col(static_cast<Eigen::Index>(k)) * (p.typical - p.null));
+      numbers.push_back({{"name", p.name},
+                         {"mean", known.first},
+                         {"sd", known.second},
+                         {"prior_mean", prior.mean() - p.null},
+                         {"prior_sd", prior.sd()},
+                         {"usual", p.typical - p.null},
+                         {"usual_moves_mm", rms(usual)}});
+    }
+    list.push_back({{"effect", candidate.effect},
+                    {"ln_bayes_factor", h.ln_evidence - nothing->ln_evidence},
+                    {"numbers", numbers}});
+  }
   return list;
 }
 
@@ -208,6 +254,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
                                        {"missing", other.diagnosis.missing}});
   f["hypotheses"] = hypotheses_json(found);
   f["included"] = included_json(found);
+  f["singles"] = singles_json(found);
   f["unexplained_mm"] = found.unexplained.mean_mm;
   f["unexplained95"] = {found.unexplained.low_mm, found.unexplained.high_mm};
   f["unexplained_bound_mm"] = found.priors.unexplained_bound_mm;

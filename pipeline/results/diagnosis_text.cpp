@@ -20,6 +20,8 @@ std::string values_of(const std::vector<diagnosis::FittedParameter>& parameters)
     const std::string unit = p.unit == "1" ? "" : " " + p.unit;
     text += fmt::format("{}{} {:.2g} [{:.2g}, {:.2g}]{}", text.empty() ? "" : ", ", p.name.substr(p.name.find('.') + 1),
                         p.value, p.low, p.high, unit);
+    if (p.name.ends_with(".log_ratio"))
+      text += fmt::format(" (x {:.2g} [{:.2g}, {:.2g}])", std::exp(p.value), std::exp(p.low), std::exp(p.high));
   }
   return text;
 }

@@ -26,6 +26,15 @@ std::string histogram(std::string line, std::span<const Eigen::Index> counts) {
 Json anatomy_json(const meshing::Anatomy& a) {
   Json json;
   json["side"] = a.side;
+  if (a.is_object()) {
+    json["half_length_mm"] = a.foot_radius_mm;
+    json["reach_mm"] = a.mound_height_mm;
+    json["centre_mm"] = numbers(a.foot_centre_mm);
+    json["outward"] = numbers(a.outward);
+    json["along"] = numbers(a.lateral);
+    json["across"] = numbers(a.head);
+    return json;
+  }
   json["foot_radius_mm"] = a.foot_radius_mm;
   json["rim_thickness_mm"] = a.rim_thickness_mm;
   json["mound_height_mm"] = a.mound_height_mm;
@@ -120,6 +129,7 @@ void fill(Json& json, const MeshFindings& findings) {
     json["mean_scaled_jacobian"] = q.mean_scaled_jacobian;
     json["scaled_jacobian_histogram_tenths"] = q.scaled_jacobian;
   }
+  for (const auto& [name, ml] : findings.parts_ml) json["parts_ml"][name] = ml;
   if (findings.curve) json["curve"] = curve_json(*findings.curve);
   if (findings.anatomy) json["anatomy"] = anatomy_json(*findings.anatomy);
 }
@@ -152,13 +162,17 @@ void say(const MeshFindings& findings, const Run& run) {
     run.say(fmt::format("{:<10}{:>9.1f} ml{}", tissue_names[t], q.tissue_ml[t],
                         findings.fractions ? fmt::format("  (voxels {:.1f} ml)", voxels) : ""));
   }
+  for (const auto& [name, ml] : findings.parts_ml) run.say(fmt::format("part {:<12}{:>6.1f} ml", name, ml));
   if (!findings.anatomy) return;
   const meshing::Anatomy& a = *findings.anatomy;
   const auto say = [&run](const meshing::Anatomy& one) {
     run.say(fmt::format("{} breast: foot radius {:.1f} mm, rim {:.1f} mm thick, mound {:.1f} mm high", one.side,
                         one.foot_radius_mm, one.rim_thickness_mm, one.mound_height_mm));
   };
-  if (a.breasts.empty()) say(a);
+  if (a.is_object())
+    run.say(fmt::format("body: {:.1f} mm from its supports at most", a.mound_height_mm));
+  else if (a.breasts.empty())
+    say(a);
   for (const meshing::Anatomy& one : a.breasts) say(one);
 }
 

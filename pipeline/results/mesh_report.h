@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "meshing/anatomy.h"
 #include "meshing/quality.h"
@@ -22,6 +24,7 @@ struct MeshFindings {
   std::optional<meshing::CurveReport> curve;
   std::optional<meshing::FractionReport> fractions;
   std::optional<meshing::Anatomy> anatomy;
+  std::vector<std::pair<std::string, double>> parts_ml = {};  ///< named parts, by name
 };
 
 /// Figures of mesh.json.

@@ -20,6 +20,8 @@ using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
+constexpr std::chrono::seconds quiet_time{5};  // between two lines of progress where no terminal shows them
+
 /// One JSON file: beside an output of another type, or an output of its own.
 struct Sidecar {
   fs::path target;
@@ -40,6 +42,7 @@ struct Run::State {
   Json stages = Json::object();
   std::string current_stage;
   Clock::time_point started = Clock::now(), stage_started = started;
+  Clock::time_point last_line = started;
   bool progress_shown = false;
   std::vector<fs::path> no_longer_needed;
 
@@ -118,6 +121,8 @@ fs::path Run::output(const fs::path& target) {
   return temporary;
 }
 
+fs::path Run::bare_output(const fs::path& target) { return state_->outputs.stage(target); }
+
 Json& Run::figures(const fs::path& output) { return state_->sidecar_of(output).figures; }
 
 void Run::say(std::string_view line) const {
@@ -134,7 +139,15 @@ void Run::warn(const std::string& line) {
 }
 
 void Run::progress(std::string_view line) const {
-  if (state_->quiet || isatty(STDERR_FILENO) == 0) return;
+  if (state_->quiet) return;
+  if (isatty(STDERR_FILENO) == 0) {  // a file or a pipe: a line now and then, so that long work is never silent
+    const auto now = Clock::now();
+    if (now - state_->last_line < quiet_time) return;
+    state_->last_line = now;
+    fmt::print(stderr, "{}: {}\n", state_->tool, line);
+    std::fflush(stderr);
+    return;
+  }
   fmt::print(stderr, "\r{}\033[K", line);
   std::fflush(stderr);
   state_->progress_shown = true;

@@ -4,8 +4,10 @@
 #include <fmt/core.h>
 #include <omp.h>
 
+#include <csignal>
 #include <filesystem>
 #include <new>
+#include <system_error>
 
 #include "common/error.h"
 #include "pipeline/tool/provenance.h"
@@ -73,6 +75,7 @@ int complain(const Tool& tool, std::string_view message, int code) {
 int tool_main(Tool& tool, int argc, char** argv) {
   use_fitting_settings(argv);
   install_interrupt_handler();
+  std::signal(SIGXFSZ, SIG_IGN);  // a file larger than ulimit -f allows: the write fails, and is told as one that does
   CLI::App app(tool.summary(), tool.name());
   CommonOptions common;
   declare_common(app, tool, common);
@@ -90,8 +93,8 @@ int tool_main(Tool& tool, int argc, char** argv) {
     return complain(tool, error.what(), exit_bad_input);
   } catch (const NumericalFailure& error) {
     return complain(tool, error.what(), exit_numerical_failure);
-  } catch (const std::filesystem::filesystem_error& error) {
-    return complain(tool, error.what(), exit_bad_input);
+  } catch (const std::system_error& error) {  // files, and standard output that is full
+    return complain(tool, fmt::format("{}; nothing was written", error.what()), exit_bad_input);
   } catch (const std::bad_alloc&) {
     return complain(tool, "out of memory; use a coarser volume or fewer triangles", exit_numerical_failure);
   } catch (const std::exception& error) {

@@ -30,6 +30,9 @@ class Run {
   /// The temporary path to write the output @p target to; see Outputs::stage.
   std::filesystem::path output(const std::filesystem::path& target);
 
+  /// The same for a file that has no sidecar of its own: a .json in the format of another program.
+  std::filesystem::path bare_output(const std::filesystem::path& target);
+
   /// The figures of the sidecar that goes beside @p output (X.ext → X.json): fill in at will, keys as in the docs.
   /// An output that is itself X.json has no other sidecar: its figures are the file.
   nlohmann::ordered_json& figures(const std::filesystem::path& output);
@@ -38,7 +41,8 @@ class Run {
   void say(std::string_view line) const;
   /// A caution for a person on standard error, kept in every sidecar under "warnings".
   void warn(const std::string& line);
-  /// Overwrites one line on standard error when it is a terminal and --quiet is off.
+  /// Says on standard error how far it is: on a terminal one line that is overwritten, else a line of its own when
+  /// none was said for 5 seconds; silent with --quiet.
   void progress(std::string_view line) const;
 
   /// Starts the named stopwatch of the sidecar's `timing` block and stops the one before.

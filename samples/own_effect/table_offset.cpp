@@ -38,7 +38,7 @@ class TableOffset : public Effect {
 
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
              Fields<Dual>& fields) const override {
-    if (scene.pose != "prone") fields.scan_motion[1] += values[0];  // LPS: y runs to the patient's back
+    if (!scene.is_imaged()) fields.scan_motion[1] += values[0];  // LPS: y runs to the patient's back
   }
 };
 

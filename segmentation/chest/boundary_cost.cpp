@@ -13,8 +13,10 @@ constexpr float forbidden = 4;       // cost of a place outside the body or next
 // Border::line works on ln(grey), so that shading and suppression failures do not matter.
 constexpr float least_grey = 1;  // per cent of fat: noise below it would weigh much in the logarithm
 constexpr double line_half_mm = 0.75, flank_from_mm = 1.5, flank_to_mm = 4.5;  // from the middle of the line
-constexpr double clear_line = 0.2;   // a line this much darker than its flanks (ln) is as clear as can be
-constexpr double clear_step = 0.35;  // so is fat this much brighter than muscle
+constexpr double clear_line = 0.2;              // a line this much darker than its flanks (ln) is as clear as can be
+constexpr double clear_step = 0.35;             // so is fat this much brighter than muscle
+constexpr double dim_fat = 92, full_fat = 110;  // per cent of fat: below, it may be muscle; from here on it is fat
+constexpr double most_step = 2;  // where suppression fails fat is far brighter, and the step says as much as a line
 constexpr double line_weight = 1, step_weight = 0.5;   // fat and muscle may be equally bright: the step counts half
 constexpr double neither = line_weight + step_weight;  // cost without line and step; with both clear it is 0
 constexpr double even_mm = 16;                         // in front of the wall fat is even so far; chest is not
@@ -55,7 +57,8 @@ class Means {
   std::vector<double> sums_, squares_;
 };
 
-void step_costs(const float* greys, int count, int end, const ChestWallOptions& options, float* cost) {
+void step_costs(const float* greys, int count, int end, const ChestWallOptions& options, bool /*strong_steps*/,
+                float* cost) {
   std::vector<float> dark(count, static_cast<float>(unknown));
   for (int i = 0; i < end; ++i)
     dark[i] = std::clamp((options.bright - greys[i]) / (options.bright - options.dark), 0.0f, 1.0f);
@@ -68,7 +71,8 @@ void step_costs(const float* greys, int count, int end, const ChestWallOptions& 
   }
 }
 
-void line_costs(const float* greys, int count, int end, const ChestWallOptions& options, float* cost) {
+void line_costs(const float* greys, int count, int end, const ChestWallOptions& options, bool strong_steps,
+                float* cost) {
   std::vector<float> logs(count);
   for (int i = 0; i < count; ++i) logs[i] = std::log(std::max(greys[i], least_grey));
   const Means means(logs.data(), count);
@@ -83,7 +87,12 @@ void line_costs(const float* greys, int count, int end, const ChestWallOptions& 
   }
   for (int i = 0; i < count; ++i) {
     const double outer = means.over(i + near, std::min(i + band, end), logs[i]);
-    const double step = std::clamp((outer - means.over(i - band, i - near + 1, logs[i])) / clear_step, 0.0, 1.0);
+    const double rise = (outer - means.over(i - band, i - near + 1, logs[i])) / clear_step;
+    // Muscle in front of the dark lung rises as steeply: more than a clear step counts only to what is as bright as
+    // fat.
+    const double fat = std::clamp((outer - std::log(dim_fat)) / (std::log(full_fat) - std::log(dim_fat)), 0.0, 1.0);
+    const double step =
+        std::clamp(rise, 0.0, 1.0) + (strong_steps ? fat * std::clamp(rise - 1, 0.0, most_step - 1) : 0);
     double second = 0;
     for (int j = i + from; j < std::min(i + to, end - skin); ++j) second = std::max(second, line[j]);
     const double uneven = means.deviation(i + near, std::min(i + even, end - skin));
@@ -95,7 +104,7 @@ void line_costs(const float* greys, int count, int end, const ChestWallOptions& 
 
 }  // namespace
 
-std::vector<float> boundary_costs(const RayProfiles& profiles, const ChestWallOptions& options) {
+std::vector<float> boundary_costs(const RayProfiles& profiles, const ChestWallOptions& options, bool strong_steps) {
   std::vector<float> costs(profiles.values.size(), 0.0f);
   const bool lines = options.border == ChestWallOptions::Border::line;
 #pragma omp parallel for schedule(static)
@@ -104,7 +113,8 @@ std::vector<float> boundary_costs(const RayProfiles& profiles, const ChestWallOp
       if (!profiles.seen(a, k)) continue;
       const std::size_t at = profiles.ray(a, k) * profiles.count;
       const int end = profiles.end[profiles.ray(a, k)];
-      (lines ? line_costs : step_costs)(profiles.values.data() + at, profiles.count, end, options, costs.data() + at);
+      (lines ? line_costs : step_costs)(profiles.values.data() + at, profiles.count, end, options, strong_steps,
+                                        costs.data() + at);
       for (int i = 0; i < profiles.count; ++i)
         if (i > end || profiles.radius_mm(a, k, i) < RayProfiles::nearest_mm) costs[at + i] = forbidden;
     }

@@ -12,6 +12,10 @@ namespace supine::segmentation {
 /// Border::step: how bright it is within band_mm inside, plus how dark outside (means of 0 to 1). Border::line: 1.5
 /// less what a dark line and the rise from muscle to fat take off. Both: plus far_weight times what speaks for a border
 /// farther out.
-std::vector<float> boundary_costs(const RayProfiles& profiles, const ChestWallOptions& options);
+/// @param strong_steps  Border::line: a step of twice a clear one to what is surely fat counts as much as a line. For
+/// looks
+///   near to what is known: farther in, lung and heart make such steps too.
+std::vector<float> boundary_costs(const RayProfiles& profiles, const ChestWallOptions& options,
+                                  bool strong_steps = false);
 
 }  // namespace supine::segmentation

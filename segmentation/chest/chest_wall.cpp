@@ -244,7 +244,7 @@ ChestWall find_chest_wall(const GreyImage& image, const Mask& body, const Torso&
   for (const Look& look : closer_looks) {
     profiles = sample_rays(image, body, wall, wall.radius_mm, -look.reach_mm, look.reach_mm);
     blur_profiles(profiles, look.angles, look.levels);
-    costs = boundary_costs(profiles, options);
+    costs = boundary_costs(profiles, options, true);
     settle(profiles, costs, options, wall);
   }
   return wall;

@@ -16,6 +16,7 @@
 #include <map>
 
 #include "common/error.h"
+#include "common/trial_process.h"
 #include "segmentation/formats/image_formats.h"
 #include "segmentation/formats/samples.h"
 
@@ -105,17 +106,16 @@ std::vector<Slice> read_headers(const fs::path& folder) {
   gdcm::Trace::ErrorOff();
   std::error_code error;
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder, error))
-    if (entry.is_regular_file()) files.push_back(entry.path());
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    if (entry->is_regular_file(error)) files.push_back(entry->path());
   if (error) throw InputError(fmt::format("{}: cannot be read: {}", folder.string(), error.message()));
   std::sort(files.begin(), files.end());
   std::vector<Slice> slices;
   for (const fs::path& file : files)
     if (auto slice = read_header(file)) slices.push_back(std::move(*slice));
   if (slices.empty())
-    throw InputError(
-        fmt::format("{}: no DICOM image among its {} files; name the folder that holds the slices of the series",
-                    folder.string(), files.size()));
+    throw InputError(fmt::format("{}: no DICOM image among its {} files; name the folder of the study or of the series",
+                                 folder.string(), files.size()));
   return slices;
 }
 
@@ -300,7 +300,10 @@ void append_pixels(const Slice& slice, std::vector<float>& voxels) {
 
 }  // namespace
 
-std::vector<DicomSeries> list_dicom_series(const fs::path& folder) { return group(read_headers(folder)); }
+std::vector<DicomSeries> list_dicom_series(const fs::path& folder) {
+  check_survivable(folder, [&] { read_headers(folder); });
+  return group(read_headers(folder));
+}
 
 std::string describe_series(const std::vector<DicomSeries>& series) {
   std::string text;
@@ -311,7 +314,9 @@ std::string describe_series(const std::vector<DicomSeries>& series) {
   return text;
 }
 
-DicomVolume read_dicom(const fs::path& folder, const std::string& wanted) {
+namespace {
+
+DicomVolume read_volume(const fs::path& folder, const std::string& wanted) {
   std::vector<Slice> slices = read_headers(folder);
   DicomVolume volume;
   volume.series = choose(folder, group(slices), wanted);
@@ -336,6 +341,14 @@ DicomVolume read_dicom(const fs::path& folder, const std::string& wanted) {
   }
   volume.file = formats::finish(folder, std::move(raw), "LPS");
   return volume;
+}
+
+}  // namespace
+
+DicomVolume read_dicom(const fs::path& folder, const std::string& wanted) {
+  // GDCM's assertions end the process on damaged files.
+  check_survivable(folder, [&] { read_volume(folder, wanted); });
+  return read_volume(folder, wanted);
 }
 
 }  // namespace supine::segmentation

@@ -20,7 +20,7 @@ struct DicomSeries {
   std::vector<std::filesystem::path> files;  ///< in the order of their names
 };
 
-/// The series of a folder (not of folders inside it), in the order of number, then uid. Files that are not DICOM or
+/// The series of a folder and of the folders inside it, in the order of number, then uid. Files that are not DICOM or
 /// hold no image are passed over.
 /// @throws InputError  when the folder cannot be read or holds no DICOM image
 std::vector<DicomSeries> list_dicom_series(const std::filesystem::path& folder);

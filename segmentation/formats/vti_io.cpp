@@ -4,6 +4,7 @@
 #include <vtkCellData.h>
 #include <vtkExecutive.h>
 #include <vtkFieldData.h>
+#include <vtkFloatArray.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
 #include <vtkNew.h>
@@ -26,6 +27,7 @@ namespace supine::segmentation {
 namespace {
 
 constexpr const char* label_array = "tissue";
+constexpr const char* share_array = "fraction_gland";
 
 std::optional<std::string> field_string(vtkImageData& image, const char* name) {
   auto* array = vtkStringArray::SafeDownCast(image.GetFieldData()->GetAbstractArray(name));
@@ -141,7 +143,8 @@ RawImage read_vti(const std::filesystem::path& file) {
 
 }  // namespace formats
 
-void write_labels(const LabelImage& labels, const std::filesystem::path& file, const LabelNotes& notes) {
+void write_labels(const LabelImage& labels, const std::filesystem::path& file, const LabelNotes& notes,
+                  const std::vector<float>& gland_share) {
   const Grid& grid = labels.grid;
   vtkNew<vtkImageData> data;
   data->SetDimensions(grid.size.x(), grid.size.y(), grid.size.z());
@@ -156,6 +159,12 @@ void write_labels(const LabelImage& labels, const std::filesystem::path& file, c
   // VTK only reads from the borrowed array.
   tissue->SetArray(const_cast<std::uint8_t*>(labels.voxels.data()), static_cast<vtkIdType>(labels.voxels.size()), 1);
   data->GetPointData()->SetScalars(tissue);
+  vtkNew<vtkFloatArray> share;
+  if (!gland_share.empty()) {
+    share->SetName(share_array);
+    share->SetArray(const_cast<float*>(gland_share.data()), static_cast<vtkIdType>(gland_share.size()), 1);
+    data->GetPointData()->AddArray(share);
+  }
   add_strings(*data, "frame", {"LPS"});
   add_strings(*data, "unit", {"mm"});
   vtkNew<vtkStringArray> names;
@@ -188,6 +197,19 @@ LabelImage read_labels(const std::filesystem::path& file) {
                       file.string(), value, label_array, tissue_count - 1));
   }
   return labels;
+}
+
+std::vector<float> read_gland_share(const std::filesystem::path& file) {
+  vtkNew<vtkXMLImageDataReader> reader;
+  update(*reader, file);
+  auto* array = vtkFloatArray::SafeDownCast(reader->GetOutput()->GetPointData()->GetArray(share_array));
+  if (!array) return {};
+  std::vector<float> share(array->GetPointer(0), array->GetPointer(0) + array->GetNumberOfTuples());
+  for (const float value : share)
+    if (!(value >= 0 && value <= 1))
+      throw InputError(fmt::format("{}: value {} of array `{}` is no share, 0 to 1; write the file with supine-segment",
+                                   file.string(), value, share_array));
+  return share;
 }
 
 LabelNotes read_label_notes(const std::filesystem::path& file) {

@@ -64,8 +64,30 @@ Step read_planes(const StepTable& table) {
   step.mid_axillary = read_plane(table, "mid_axillary", 1);
   step.inframammary = read_plane(table, "inframammary", 2);
   step.superior = read_plane(table, "superior", 2);
-  step.side = table.choice<Side>("side", {{"both", Side::both}, {"left", Side::left}, {"right", Side::right}})
-                  .value_or(step.side);
+  using Ends = Planes::Ends;
+  step.ends = table.choice<Ends>("ends", {{"anatomy", Ends::anatomy}, {"reader", Ends::reader}}).value_or(step.ends);
+  step.side = table.choice<Side>("side", {{"both", Side::both}, {"left", Side::left}, {"right", Side::right}});
+  return step;
+}
+
+Step read_gland(const StepTable& table) {
+  using Contrast = GlandOptions::Contrast;
+  Gland step;
+  step.mask = table.required_text("mask");
+  step.body = table.required_text("body");
+  step.breast = table.required_text("breast");
+  step.chest = table.required_text("chest");
+  GlandOptions& o = step.options;
+  o.contrast = table.required_choice<Contrast>("contrast", {{"dark", Contrast::dark}, {"bright", Contrast::bright}});
+  o.shading_mm = table.number("shading_mm", positive).value_or(o.shading_mm);
+  o.neighbourhood = table.number("neighbourhood", not_negative).value_or(o.neighbourhood);
+  o.skin_mm = table.number("skin_mm", positive).value_or(o.skin_mm);
+  o.chest_mm = table.number("chest_mm", not_negative).value_or(o.chest_mm);
+  o.superficial_mm = table.number("superficial_mm", not_negative).value_or(o.superficial_mm);
+  o.fan_deg = table.number("fan_deg", {.lower = 10, .upper = 180}).value_or(o.fan_deg);
+  o.bridge_mm = table.number("bridge_mm", not_negative).value_or(o.bridge_mm);
+  o.least_ml = table.number("least_ml", not_negative).value_or(o.least_ml);
+  o.failed_share = table.number("failed_share", {.lower = 1.1}).value_or(o.failed_share);
   return step;
 }
 

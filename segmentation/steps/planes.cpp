@@ -14,6 +14,7 @@ namespace {
 
 constexpr double widest_share = 0.99;  // of its half width: from here on the chest counts as widest
 constexpr double mound_share = 0.15;   // of the mound's depth: where it begins
+constexpr double below_fold_mm = 10;   // that readers still count
 constexpr double near_sternum_mm = 20, far_from_sternum_mm = 140;
 
 double median(std::vector<double> values) {
@@ -82,11 +83,32 @@ std::vector<CutPlane> find_planes(const FrontSkin& front, const ChestWall& wall,
   };
   const double middle_z = wall.z(wall.radius_mm.cols() / 2);
   add("sternum", 'x', step.sternum, [&] { return wall.torso.sternum_x(middle_z); });
-  add("mid_axillary", 'y', step.mid_axillary, [&] { return find_mid_axillary(wall); });
-  add("inframammary_left", 'z', step.inframammary, [&] { return find_fold(front, wall, 1); });
-  add("inframammary_right", 'z', step.inframammary, [&] { return find_fold(front, wall, -1); });
+  const bool reader = step.ends == Planes::Ends::reader;
+  const auto fold = [&](double sign) {
+    return reader ? std::min(find_fold(front, wall, 1), find_fold(front, wall, -1)) - below_fold_mm
+                  : find_fold(front, wall, sign);
+  };
+  add("mid_axillary", 'y', step.mid_axillary, [&] { return reader ? half_turn_y_mm(wall) : find_mid_axillary(wall); });
+  add("inframammary_left", 'z', step.inframammary, [&] { return fold(1); });
+  add("inframammary_right", 'z', step.inframammary, [&] { return fold(-1); });
   add("superior", 'z', step.superior, [&] { return wall.z(wall.radius_mm.cols() - 1) - wall.step_z_mm / 2; });
   return planes;
+}
+
+double half_turn_y_mm(const ChestWall& wall) {
+  constexpr Eigen::Index reach = 6;  // rays to either side that give the direction of the wall
+  std::vector<double> depths;
+  for (Eigen::Index k = 0; k < wall.radius_mm.cols(); ++k)
+    for (const double sign : {-1.0, 1.0})
+      for (Eigen::Index a = reach; a + reach < wall.radius_mm.rows(); ++a) {
+        const Eigen::Index ray = sign > 0 ? a : wall.radius_mm.rows() - 1 - a;
+        if (sign * wall.angle(ray) <= 0.3 || std::isnan(wall.cost(ray, k))) continue;
+        const Eigen::Vector3d way = wall.point(ray + reach, k) - wall.point(ray - reach, k);
+        if (sign * way.y() < std::abs(way.x())) continue;
+        depths.push_back(wall.point(ray, k).y());
+        break;
+      }
+  return depths.empty() ? wall.centre_y_mm : median(std::move(depths));
 }
 
 PlaneMasks cut_by_planes(const Mask& body, const Grid& grid, const ChestWall& wall, const std::vector<CutPlane>& planes,

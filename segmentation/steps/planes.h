@@ -23,7 +23,13 @@ struct CutPlane {
 /// and its back: the median over levels and sides of the depth at which the wall reaches 99 % of its half width.
 /// inframammary, one for each side: the lowest level at which the tissue in front of the chest wall is deeper than over
 /// the belly by 15 % of the mound's full depth. superior: the uppermost level of the image, less one voxel.
+/// That is Planes::Ends::anatomy; with reader mid_axillary is half_turn_y_mm, and both folds are the lower one less 10
+/// mm.
 std::vector<CutPlane> find_planes(const FrontSkin& front, const ChestWall& wall, const Planes& step);
+
+/// The depth y at which the front of the chest has turned half way (45 degrees) to the side: the median over levels and
+/// sides. The middle of the rays where the image shows no such turn.
+double half_turn_y_mm(const ChestWall& wall);
 
 /// The masks of the model and of the two sides.
 struct PlaneMasks {

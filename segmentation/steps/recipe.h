@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "segmentation/chest/chest_wall.h"
+#include "segmentation/gland/gland.h"
 #include "segmentation/tissue.h"
 
 namespace supine::segmentation {
@@ -182,7 +183,21 @@ struct Planes {
   Plane mid_axillary;  ///< y; the model ends there towards the back
   Plane inframammary;  ///< z; towards the feet
   Plane superior;      ///< z; towards the head
-  enum class Side { both, left, right } side = Side::both;
+  /// Where the breast ends. anatomy: at the mid-axillary line, and at the fold of each side. reader: where those end it
+  /// who draw breasts by hand, in front of the line where the chest turns to the side, and 10 mm below the lower fold.
+  enum class Ends { anatomy, reader } ends = Ends::anatomy;
+  enum class Side { both, left, right };
+  std::optional<Side> side;  ///< absent: that of the case
+};
+
+/// mask = the gland of the breasts, by classes of the grey with their neighbourhood and by its place (find_gland).
+/// Keeps the share of gland in each voxel beside the labels.
+struct Gland {
+  std::string mask;
+  std::string body;    ///< a mask of step Body
+  std::string breast;  ///< the modelled part of it without the chest
+  std::string chest;   ///< the mask of a step Chest
+  GlandOptions options;
 };
 
 /// Writes `tissue` into the label map wherever the mask is; with `over`, only where one of those tissues was.
@@ -193,17 +208,23 @@ struct Paint {
 };
 
 using Step = std::variant<NoiseFloor, Bias, Smooth, Threshold, Grow, Islands, Holes, Combine, Morph, Layer, Region,
-                          Paint, Body, Chest, Planes, Otsu, March>;
+                          Paint, Body, Chest, Planes, Otsu, March, Gland>;
 
 /// Names of the steps, in the order of the alternatives of Step.
 constexpr const char* step_names[] = {"noise_floor", "bias",    "smooth", "threshold", "grow",   "islands",
                                       "holes",       "combine", "morph",  "layer",     "region", "paint",
-                                      "body",        "chest",   "planes", "otsu",      "march"};
+                                      "body",        "chest",   "planes", "otsu",      "march",  "gland"};
 static_assert(std::size(step_names) == std::variant_size_v<Step>);
 
 /// The steps of a segmentation, in the order in which they run.
 struct Recipe {
+  std::string name;  ///< of one that comes with the program; else empty
+  /// What the greys are taken for: checked where a step finds the chest. absent: not checked.
+  std::optional<bool> fat_suppressed = {};
   std::vector<Step> steps;
+
+  /// The side of the steps Planes that name none.
+  void set_side(Planes::Side side);
 };
 
 }  // namespace supine::segmentation

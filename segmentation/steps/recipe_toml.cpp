@@ -5,8 +5,10 @@
 
 #include <algorithm>
 
+#include "common/error.h"
 #include "common/suggestion.h"
 #include "segmentation/formats/image_formats.h"
+#include "segmentation/recipes/shipped.h"
 #include "segmentation/steps/step_readers.h"
 
 namespace supine::segmentation {
@@ -27,16 +29,41 @@ Step read_step(const StepTable& table) {
 Recipe read_recipe(const TomlReader& segmentation, const std::string& frame) {
   const auto to_lps = formats::signs_to_lps(frame);
   if (!to_lps) segmentation.fail("case.frame", fmt::format("\"{}\" is not known; LPS or RAS expected", frame));
-  segmentation.allow({"step"});
+  segmentation.allow({"step", "recipe", "image"});
+  if (const auto name = segmentation.text("recipe")) {
+    if (segmentation.has("step"))
+      segmentation.fail("recipe", "has no place beside [[segmentation.step]]; give a name, or steps");
+    if (!shipped_recipe(*name))
+      segmentation.fail("recipe", fmt::format("\"{}\" is not known; {}", *name, suggestion(*name, recipe_names())));
+    return read_shipped_recipe(*name, frame);
+  }
   segmentation.require("step");
   const toml::array* steps = segmentation.table().get_as<toml::array>("step");
   if (!steps || !steps->is_array_of_tables())
     segmentation.fail("step", "must be tables: write [[segmentation.step]], with two brackets, on a line of its own");
   Recipe recipe;
+  recipe.fat_suppressed = segmentation.choice<bool>("image", {{"t1", false}, {"fatsat", true}});
   for (const toml::node& step : *steps) {
     const std::string place = fmt::format("{}.step {}", segmentation.section(), recipe.steps.size() + 1);
     recipe.steps.push_back(read_step({TomlReader(*step.as_table(), segmentation.file(), place), *to_lps}));
   }
+  return recipe;
+}
+
+std::vector<std::string> recipe_names() {
+  std::vector<std::string> names;
+  for (const ShippedRecipe& recipe : shipped_recipes()) names.emplace_back(recipe.name);
+  return names;
+}
+
+Recipe read_shipped_recipe(const std::string& name, const std::string& frame) {
+  const ShippedRecipe* shipped = shipped_recipe(name);
+  if (!shipped)
+    throw InputError(
+        fmt::format("no recipe \"{}\" comes with the program; {}", name, suggestion(name, recipe_names())));
+  const toml::table table = toml::parse(shipped->text);
+  Recipe recipe = read_recipe(*TomlReader(table, name + " (shipped)", "").sub_table("segmentation"), frame);
+  recipe.name = name;
   return recipe;
 }
 

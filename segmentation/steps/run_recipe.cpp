@@ -8,6 +8,7 @@
 #include <map>
 
 #include "common/error.h"
+#include "segmentation/chest/leaks.h"
 #include "segmentation/fronts/fast_marching.h"
 #include "segmentation/masks.h"
 #include "segmentation/steps/body.h"
@@ -18,6 +19,7 @@
 namespace supine::segmentation {
 namespace {
 
+constexpr double flank_mm = 15;  // no gland lies so near to where the chest turns to the side
 // So that a bound of a whole number of voxels includes it.
 constexpr double rounding = 1e-9;
 
@@ -58,6 +60,7 @@ class StepRunner {
   std::string run(const Planes& step);
   std::string run(const Otsu& step);
   std::string run(const March& step);
+  std::string run(const Gland& step);
 
   const std::vector<CutPlane>& planes() const { return planes_; }
   std::vector<ChestWall> take_walls() {
@@ -65,6 +68,9 @@ class StepRunner {
     for (auto& [name, wall] : walls_) walls.push_back(std::move(wall));
     return walls;
   }
+  const LabelImage& labels() const { return labels_; }
+  const ChestWall& last_wall() const { return walls_.at(last_wall_); }
+  std::vector<float> take_fraction() { return std::move(fraction_); }
   LabelImage take_labels() { return std::move(labels_); }
 
  private:
@@ -78,7 +84,9 @@ class StepRunner {
   LabelImage labels_;
   std::map<std::string, Mask> masks_;
   std::map<std::string, ChestWall> walls_;
+  std::string last_wall_;
   std::vector<CutPlane> planes_;
+  std::vector<float> fraction_;
 };
 
 const Mask& StepRunner::mask(const std::string& name) const {
@@ -230,6 +238,7 @@ std::string StepRunner::run(const Chest& step) {
       }
   const Superellipse shape = wall.superellipse;
   walls_[step.mask] = std::move(wall);
+  last_wall_ = step.mask;
   return store(step.mask, std::move(chest)) +
          fmt::format(
              "; middle line x = {:.1f} {:+.3f} z mm from {} levels, skin over the sternum at y = {:.1f} mm; oval "
@@ -244,7 +253,7 @@ std::string StepRunner::run(const Planes& step) {
   if (wall == walls_.end())
     throw InputError(fmt::format("\"{}\" is not the mask of an earlier step chest", step.chest));
   planes_ = find_planes(front_skin(body, grid()), wall->second, step);
-  PlaneMasks masks = cut_by_planes(body, grid(), wall->second, planes_, step.side);
+  PlaneMasks masks = cut_by_planes(body, grid(), wall->second, planes_, step.side.value_or(Planes::Side::both));
   if (!step.left.empty()) store(step.left, std::move(masks.left));
   if (!step.right.empty()) store(step.right, std::move(masks.right));
   std::string line = store(step.mask, std::move(masks.model));
@@ -253,10 +262,57 @@ std::string StepRunner::run(const Planes& step) {
   return line;
 }
 
+std::string StepRunner::run(const Gland& step) {
+  const auto found = walls_.find(step.chest);
+  if (found == walls_.end())
+    throw InputError(fmt::format("\"{}\" is not the mask of an earlier step chest", step.chest));
+  const ChestWall& wall = found->second;
+  const GlandPlace place{mask(step.body),
+                         mask(step.breast),
+                         mask(step.chest),
+                         wall.torso.sternum_x(wall.z(wall.radius_mm.cols() / 2)),
+                         wall.torso.sternum_skin_y_mm,
+                         half_turn_y_mm(wall) - flank_mm};
+  GlandResult result = find_gland(image_, place, step.options);
+  fraction_ = std::move(result.fraction);
+  const auto voxels = std::count(result.gland.begin(), result.gland.end(), 1);
+  masks_[step.mask] = std::move(result.gland);  // may be empty: some breasts show none
+  return fmt::format("{}: {} voxels, {:.1f} ml", step.mask, voxels,
+                     static_cast<double>(voxels) * grid().voxel_volume_mm3() / 1000) +
+         fmt::format(
+             "; fat scatters by {:.0f} %, pure gland differs from it by {:.0f} %, shading {:.2f} to {:.2f}, "
+             "suppression failed in {:.0f} ml, {:.0f} ml look like gland but lie elsewhere (behind y = {:.0f} mm, "
+             "small, "
+             "under the skin)",
+             100 * result.fat_sd, 100 * result.pure, result.shading_low, result.shading_high, result.failed_ml,
+             result.aside_ml, place.back_y_mm);
+}
+
+}  // namespace
+
+void Recipe::set_side(Planes::Side side) {
+  for (Step& step : steps)
+    if (auto* planes = std::get_if<Planes>(&step); planes && !planes->side) planes->side = side;
+}
+
+namespace {
+
+/// Where the image shows no border between breast and muscle, in front of the model's back.
+std::vector<Doubt> doubts_of_wall(const RecipeResult& result) {
+  double back_mm = std::numeric_limits<double>::infinity();
+  for (const CutPlane& plane : result.planes)
+    if (plane.name == "mid_axillary") back_mm = plane.at_mm;
+  std::vector<Doubt> doubts;
+  for (const ChestWall& wall : result.walls)
+    for (const Leak& leak : find_leaks(wall, back_mm)) doubts.push_back({describe(leak), leak.middle_mm});
+  return doubts;
+}
+
 }  // namespace
 
 RecipeResult run_recipe(GreyImage image, const Recipe& recipe,
                         const std::function<void(const std::string&)>& progress) {
+  const GreyImage given = recipe.fat_suppressed ? image : GreyImage();
   StepRunner runner(std::move(image));
   RecipeResult result;
   for (std::size_t s = 0; s < recipe.steps.size(); ++s) {
@@ -265,13 +321,20 @@ RecipeResult run_recipe(GreyImage image, const Recipe& recipe,
     try {
       const auto line = std::visit([&runner](const auto& step) { return runner.run(step); }, recipe.steps[s]);
       result.log.push_back(title + ": " + line);
+      if (recipe.fat_suppressed && std::holds_alternative<Chest>(recipe.steps[s]))
+        require_kind({given, runner.labels(), runner.last_wall(), *recipe.fat_suppressed});
     } catch (const InputError& error) {
       throw InputError(fmt::format("segmentation recipe, {}: {}", title, error.what()));
     }
   }
   result.labels = runner.take_labels();
+  result.fraction_gland = runner.take_fraction();
   result.planes = runner.planes();
   result.walls = runner.take_walls();
+  if (recipe.fat_suppressed && !result.walls.empty()) {
+    result.doubts = find_doubts({given, result.labels, result.walls.back(), *recipe.fat_suppressed});
+    for (Doubt& doubt : doubts_of_wall(result)) result.doubts.push_back(std::move(doubt));
+  }
   return result;
 }
 

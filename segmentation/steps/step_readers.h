@@ -32,12 +32,13 @@ Step read_paint(const StepTable& table);
 Step read_body(const StepTable& table);
 Step read_chest(const StepTable& table);
 Step read_planes(const StepTable& table);
+Step read_gland(const StepTable& table);
 
 /// In the order of step_names.
 constexpr Step (*step_readers[])(const StepTable&) = {
     read_noise_floor, read_bias,    read_smooth, read_threshold, read_grow,   read_islands,
     read_holes,       read_combine, read_morph,  read_layer,     read_region, read_paint,
-    read_body,        read_chest,   read_planes, read_otsu,      read_march};
+    read_body,        read_chest,   read_planes, read_otsu,      read_march,  read_gland};
 static_assert(std::size(step_readers) == std::variant_size_v<Step>);
 
 }  // namespace supine::segmentation

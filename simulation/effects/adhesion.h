@@ -10,7 +10,9 @@ class Adhesion : public Effect {
  public:
   std::string name() const override { return "adhesion"; }
   std::string meaning() const override { return "inner surface attached to the muscle instead of sliding"; }
-  EffectTraits traits() const override { return {.kind = EffectKind::boundary, .error_source = "springs"}; }
+  EffectTraits traits() const override {
+    return {.kind = EffectKind::boundary, .error_source = "springs", .breast_only = true};
+  }
   double tolerance(const std::string&, const MeasurementTolerances& known) const override { return known.spring_log; }
   const std::vector<Parameter>& parameters() const override;
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,

@@ -55,7 +55,7 @@ const std::vector<Parameter>& ArmTraction::parameters() const {
 
 void ArmTraction::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                         Fields<Dual>& fields) const {
-  if (scene.pose == "prone") return;
+  if (scene.is_imaged() || scene.anatomy.is_object()) return;
   const Dual &lateral_kpa = values[0], &head_kpa = values[1], &centre_lateral = values[2], &centre_head = values[3],
              &radius = values[4];
   const FaceGroup& skin = scene.layout.skin;

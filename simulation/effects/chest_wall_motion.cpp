@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/effects/chest_wall_motion.h"
 
+#include "meshing/anatomy.h"
 #include "simulation/effects/bump.h"
 #include "simulation/fields.h"
 
@@ -44,7 +45,7 @@ const std::vector<Parameter>& ChestWallMotion::parameters() const {
 
 void ChestWallMotion::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                             Fields<Dual>& fields) const {
-  if (scene.pose == "prone") return;
+  if (scene.is_imaged() || scene.anatomy.is_object()) return;
   const Dual &amplitude_mm = values[0], &centre_lateral = values[1], &centre_head = values[2], &radius = values[3];
   const Table& q = scene.layout.interface.q;
   for (Eigen::Index p = 0; p < q.rows(); ++p)

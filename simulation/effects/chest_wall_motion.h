@@ -7,7 +7,7 @@ namespace supine::simulation {
 
 /// The rigid muscle is somewhere else than in the image: under the mound it has come out along its normal by
 /// amplitude_mm in the middle of the foot, fading smoothly to nothing at the foot's mean radius, unless centre
-/// and radius say otherwise. Every pose but prone.
+/// and radius say otherwise. Every pose but the imaged one.
 class ChestWallMotion : public Effect {
  public:
   std::string name() const override { return "chest_wall_motion"; }
@@ -16,6 +16,7 @@ class ChestWallMotion : public Effect {
     return {.kind = EffectKind::boundary,
             .acts_in = ActsIn::all_but_imaged,
             .error_source = "chest_wall",
+            .breast_only = true,
             .error_of_each_scan = true};
   }
   double tolerance(const std::string& unit, const MeasurementTolerances& known) const override {

@@ -20,7 +20,7 @@ const std::vector<Parameter>& Creep::parameters() const {
 
 void Creep::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                   Fields<Dual>& fields) const {
-  if (scene.pose != "prone") return;
+  if (!scene.is_imaged()) return;
   const Dual& log_softening = values[0];
   for (Dual& e : fields.ln_young) e -= log_softening;
 }

@@ -10,6 +10,7 @@ class FibreAnisotropy : public Effect {
  public:
   std::string name() const override { return "fibre_anisotropy"; }
   std::string meaning() const override { return "fibres from muscle to skin that pull when stretched"; }
+  EffectTraits traits() const override { return {.breast_only = true}; }
   const std::vector<Parameter>& parameters() const override;
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;

@@ -27,7 +27,7 @@ const std::vector<Parameter>& GravityTilt::parameters() const {
 
 void GravityTilt::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                         Fields<Dual>& fields) const {
-  if (scene.pose == "prone") return;
+  if (scene.is_imaged()) return;
   const Dual &roll_rad = values[0], &pitch_rad = values[1];
   const Dual cr = ceres::cos(roll_rad), sr = ceres::sin(roll_rad), cp = ceres::cos(pitch_rad),
              sp = ceres::sin(pitch_rad);

@@ -5,8 +5,8 @@
 
 namespace supine::simulation {
 
-/// The patient does not lie as the case says: gravity of every pose but prone turned about the patient's head-foot
-/// axis (roll) and left-right axis (pitch), right-handed.
+/// The patient does not lie as the case says: gravity of every pose but the imaged one turned about the patient's
+/// head-foot axis (roll) and left-right axis (pitch), right-handed.
 class GravityTilt : public Effect {
  public:
   std::string name() const override { return "gravity_tilt"; }

@@ -12,7 +12,7 @@ class Ligament : public Effect {
  public:
   std::string name() const override { return "ligament"; }
   std::string meaning() const override { return "ring at the mound's foot that ties the breast to the muscle"; }
-  EffectTraits traits() const override { return {.kind = EffectKind::boundary}; }
+  EffectTraits traits() const override { return {.kind = EffectKind::boundary, .breast_only = true}; }
   const std::vector<Parameter>& parameters() const override;
   const std::vector<OptionRow>& options() const override;
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,

@@ -55,7 +55,7 @@ const std::vector<Parameter>& Misregistration::parameters() const {
 
 void Misregistration::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
                             Fields<Dual>& fields) const {
-  if (scene.pose == "prone") return;
+  if (scene.is_imaged()) return;
   // The rows stand in the order of scan_motion.
   for (int i = 0; i < 6; ++i) fields.scan_motion[i] += values[i];
 }

@@ -102,6 +102,9 @@ void check_exportable(Solver solver, const meshing::TetMesh& mesh, const meshing
   if (mesh.order() != 1)
     refuse(words, "this mesh: quadratic cells are not written (each program places their points differently)",
            "mesh with supine-tetrahedralise --order 1");
+  if (!mesh.support_names.empty())
+    refuse(words, "supports with names (an object: springs along and across the normal)",
+           "only a breast on its muscle is written");
   check_model(words, model);
   const Layout layout = make_layout(mesh, anatomy);
   for (const PoseLoad& pose : poses) check_fields(words, model, {mesh, anatomy, layout, pose.name}, pose.gravity);

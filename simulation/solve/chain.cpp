@@ -16,7 +16,11 @@ constexpr double correction_tolerance_mm = 1e-3;  // of the fixed point: far und
 constexpr double second_shape_bound_mm = 1e-3;    // two balanced shapes this close are one
 constexpr double kg_mm3_per_kg_m3 = 1e-9;
 
-void check_prone_gravity(const PoseLoad& prone, const meshing::Anatomy& anatomy) {
+void check_imaged_pose(const PoseLoad& prone, const meshing::Anatomy& anatomy) {
+  if (prone.name != anatomy.imaged_pose)
+    throw InputError(fmt::format("the body was imaged in pose '{}', and the chain starts from '{}'",
+                                 anatomy.imaged_pose, prone.name));
+  if (prone.name != "prone" || anatomy.is_object()) return;
   const double along = prone.gravity.dot(anatomy.outward);
   if (along > 0) return;
   const Eigen::Vector3d& n = anatomy.outward;
@@ -25,6 +29,17 @@ void check_prone_gravity(const PoseLoad& prone, const meshing::Anatomy& anatomy)
       "({:.3f}, {:.3f}, {:.3f}): the angle must be under 90 degrees. A prone breast hangs away from the chest: check "
       "the sign, or case.frame against the frame of the image",
       prone.gravity.x(), prone.gravity.y(), prone.gravity.z(), n.x(), n.y(), n.z()));
+}
+
+void check_supine_gravity(const PoseLoad& pose, const meshing::Anatomy& anatomy) {
+  const double along = pose.gravity.dot(anatomy.outward);
+  if (pose.name != "supine" || anatomy.is_object() || along <= 0) return;
+  const Eigen::Vector3d& n = anatomy.outward;
+  throw InputError(fmt::format(
+      "pose.supine.gravity = [{:.3f}, {:.3f}, {:.3f}] pulls the breast off the muscle, whose outward normal is "
+      "({:.3f}, "
+      "{:.3f}, {:.3f}): the angle must be over 90 degrees. On the back the breast lies on the chest: check the sign",
+      pose.gravity.x(), pose.gravity.y(), pose.gravity.z(), n.x(), n.y(), n.z()));
 }
 
 /// Notes smallest det F at the quadrature points and the cells folded in @p x or @p X.
@@ -72,7 +87,8 @@ Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
 Chain::Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
              std::vector<PoseLoad> poses, SolveOptions options)
     : poses_(std::move(poses)), mechanics_(mesh, anatomy, model), solver_(mechanics_, std::move(options)) {
-  check_prone_gravity(poses_.at(0), anatomy);
+  check_imaged_pose(poses_.at(0), anatomy);
+  for (const PoseLoad& pose : poses_) check_supine_gravity(pose, anatomy);
 }
 
 Fields<Dual> Chain::fields(const Model& model, const PoseLoad& pose, const std::string& varied) const {
@@ -92,6 +108,7 @@ ChainSolution Chain::solve(const Model& model, const ChainSolution* near, Invers
 ChainSolution Chain::solve_all(const Model& model, const ChainSolution* near, InverseMethod method) {
   const meshing::TetMesh& mesh = mechanics_.mesh();
   solver_.forget();
+  const int work_before = solver_.work();
   ChainSolution solution;
   const Eigen::VectorXd offset = values_of(fields(model, poses_[0])).imaged_offset;
   solution.prone = mesh.points + Eigen::Map<const Points>(offset.data(), mesh.points.rows(), 3);
@@ -108,13 +125,19 @@ ChainSolution Chain::solve_all(const Model& model, const ChainSolution* near, In
     note_folds(mesh, pose.x, pose.name, pose.report, solution.warnings);
     solution.poses.push_back(std::move(pose));
   }
+  solution.work = solver_.work() - work_before;
   return solution;
 }
 
 void Chain::certify(const Model& model, ChainSolution& solution) {
   solver_.forget();
-  load(model, poses_[0]);
   solution.round_trip.name = poses_[0].name;
+  if (imaged_free_of_load()) {
+    solution.round_trip.x = solution.prone;
+    if (!mechanics_.has_energy()) look_for_second_shapes(model, solution);
+    return;
+  }
+  load(model, poses_[0]);
   solution.round_trip.report = solver_.forward(solution.X, solution.round_trip.x, "undeformed → " + poses_[0].name);
   const Eigen::VectorXd error = (solution.round_trip.x - solution.prone).rowwise().norm();
   solution.round_trip_max_mm = error.maxCoeff();
@@ -128,7 +151,7 @@ void Chain::look_for_second_shapes(const Model& model, ChainSolution& solution) 
     load(model, poses_[p]);
     Points other;
     try {
-      solver_.forward(solution.X, other, "prone → " + pose.name, &solution.prone);
+      solver_.forward(solution.X, other, poses_[0].name + " → " + pose.name, &solution.prone);
     } catch (const NumericalFailure&) {
       continue;  // that way leads nowhere: no second shape
     }
@@ -138,25 +161,29 @@ void Chain::look_for_second_shapes(const Model& model, ChainSolution& solution) 
     pose.second_shape_mm = distance;
     solution.warnings.push_back(fmt::format(
         "{}: two balanced shapes, {:.2f} mm apart at ({:.1f}, {:.1f}, {:.1f}) mm: one is reached from the undeformed "
-        "shape, the other from the prone one, and forces without an energy (breast.law = corotational_qr, friction) "
+        "shape, the other from the {} one, and forces without an energy (breast.law = corotational_qr, friction) "
         "cannot say which holds; use breast.law = \"corotational\", or raise breast.young_modulus_kpa",
-        pose.name, distance, pose.x(node, 0), pose.x(node, 1), pose.x(node, 2)));
+        pose.name, distance, pose.x(node, 0), pose.x(node, 1), pose.x(node, 2), poses_[0].name));
   }
 }
 
 void Chain::solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near,
                              ChainSolution& solution) {
   const PoseLoad& prone = poses_[0];
+  if (imaged_free_of_load()) {
+    solution.X = solution.prone;
+    return;
+  }
+  const std::string way = prone.name + " → undeformed";
   if (method == InverseMethod::newton) {
     load(model, prone);
     Points start;
     if (near != nullptr) start = solution.prone + (near->X - near->prone);
-    solution.inverse =
-        solver_.inverse(solution.prone, solution.X, "prone → undeformed", near != nullptr ? &start : nullptr);
+    solution.inverse = solver_.inverse(solution.prone, solution.X, way, near != nullptr ? &start : nullptr);
     return;
   }
   load(model, {.name = prone.name, .gravity = -prone.gravity});
-  solution.inverse = solver_.forward(solution.prone, solution.X, "prone → undeformed (reversed gravity)");
+  solution.inverse = solver_.forward(solution.prone, solution.X, way + " (reversed gravity)");
   if (method == InverseMethod::fixed_point) correct_by_fixed_point(model, solution);
 }
 
@@ -166,7 +193,7 @@ void Chain::correct_by_fixed_point(const Model& model, ChainSolution& solution) 
   double error = 0;
   for (int correction = 0; correction < max_corrections; ++correction) {
     Points x;
-    const SolveReport forward = solver_.forward(solution.X, x, "prone → undeformed (fixed point)");
+    const SolveReport forward = solver_.forward(solution.X, x, poses_[0].name + " → undeformed (fixed point)");
     report.newton_iterations += forward.newton_iterations;
     report.factorisations += forward.factorisations;
     report.load_steps = forward.load_steps;
@@ -177,9 +204,9 @@ void Chain::correct_by_fixed_point(const Model& model, ChainSolution& solution) 
     solution.X -= x - solution.prone;
   }
   throw NumericalFailure(
-      fmt::format("prone → undeformed (fixed point): still {:.3g} mm off after {} corrections (bound {} mm); use "
+      fmt::format("{} → undeformed (fixed point): still {:.3g} mm off after {} corrections (bound {} mm); use "
                   "--inverse newton",
-                  error, max_corrections, correction_tolerance_mm));
+                  poses_[0].name, error, max_corrections, correction_tolerance_mm));
 }
 
 ChainSolution solve_chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,

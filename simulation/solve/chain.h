@@ -26,34 +26,43 @@ struct PoseSolution {
   std::string name;
   Points x;  ///< #N by 3, mm
   SolveReport report;
-  /// Largest distance to another balanced shape, that the solver reaches from the prone one; 0 where there is none.
+  /// Largest distance to another balanced shape, that the solver reaches from the imaged one; 0 where there is none.
   /// Looked for by Chain::certify() and only where forces have no energy (corotational_qr, friction): with one, the
   /// solver goes downhill.
   double second_shape_mm = 0;
 };
 
 struct ChainSolution {
-  Points prone;  ///< the known shape: imaged nodes, moved by what the model says of the segmentation; #N by 3, mm
+  Points prone;  ///< the known shape, of the imaged pose: imaged nodes, moved by what the model says of the
+                 ///< segmentation; #N by 3, mm
   Points X;      ///< undeformed shape, #N by 3, mm
   SolveReport inverse;
-  std::vector<PoseSolution> poses;  ///< all but prone, in the order given
-  PoseSolution round_trip;          ///< prone again, from X and no load; filled by Chain::certify()
+  std::vector<PoseSolution> poses;  ///< all but the imaged one, in the order given
+  PoseSolution round_trip;          ///< the imaged pose again, from X and no load; filled by Chain::certify()
   double round_trip_max_mm = 0;     ///< its largest distance to the known shape
   double round_trip_rms_mm = 0;
+  int work = 0;                       ///< what Chain::solve() cost: EquilibriumSolver::work()
   std::vector<std::string> warnings;  ///< what a user must know of the answer
 };
 
-/// prone (imaged) → undeformed → every other pose, for one mesh and one kind of model (laws, boundary kinds), as often
+/// Name of the imaged pose of a body that was imaged free of load (CAD, cast, buoyancy): its shape is the undeformed
+/// one as it stands, there is no inverse and no round trip.
+inline constexpr const char* free_of_load = "undeformed";
+
+/// imaged (prone) → undeformed → every other pose, for one mesh and one kind of model (laws, boundary kinds), as often
 /// as wanted with other numbers and effects. Symbolic work and memory are kept between solves.
 class Chain {
  public:
   /// @param mesh, anatomy  of the imaged shape; must outlive the object
-  /// @param poses  the first one is prone, the imaged pose; at least that
-  /// @throws InputError  prone gravity that points into the muscle (bound: the angle to the muscle's outward normal is
+  /// @param poses  the first one is the imaged pose; at least that. Gravity may be zero in it
+  /// @throws InputError  the first pose is not anatomy.imaged_pose; prone gravity of a breast that points into the
+  /// muscle (bound: the angle to the muscle's outward normal is
   ///   under 90°); what Mechanics refuses
   Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model, std::vector<PoseLoad> poses,
         SolveOptions options = {});
 
+  /// Whether the body was imaged free of load.
+  bool imaged_free_of_load() const { return poses_[0].name == free_of_load; }
   const Mechanics& mechanics() const { return mechanics_; }
   const std::vector<PoseLoad>& poses() const { return poses_; }
 
@@ -67,10 +76,14 @@ class Chain {
   ChainSolution solve(const Model& model, const ChainSolution* near = nullptr,
                       InverseMethod method = InverseMethod::newton);
 
-  /// Makes the round trip: loads solution.X with prone gravity, from no load. Where forces have no energy it also looks
-  /// for a second balanced shape of every pose.
+  /// EquilibriumSolver::limit_work() of all solves of a chain together: a trial that costs much more than others is not
+  /// worth waiting for.
+  void limit_work(std::optional<int> most) { solver_.limit_work(most); }
+
+  /// Makes the round trip: loads solution.X with the imaged pose's gravity, from no load. Where forces have no energy
+  /// it also looks for a second balanced shape of every pose.
   /// @param solution  of @p model by this chain
-  /// @throws NumericalFailure  no equilibrium on the way back to prone
+  /// @throws NumericalFailure  no equilibrium on the way back to the imaged pose
   void certify(const Model& model, ChainSolution& solution);
 
   /// Fields of one pose with the derivative with respect to @p varied (make_fields).

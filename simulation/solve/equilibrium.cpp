@@ -8,9 +8,12 @@
 #include <utility>
 
 #include "common/error.h"
+#include "simulation/solve/newton_direction.h"
 
 namespace supine::simulation {
 namespace {
+
+constexpr double rounding_mn = 1e-5;  // the weight of a microgram
 
 // Load steps.
 constexpr int quick_iterations = 8;        // a load step solved in so many is easy: the next one is twice as long
@@ -54,6 +57,8 @@ std::string reason(Termination end, int iterations, double residual_share) {
     case Termination::iteration_limit:
       return fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iterations,
                          residual_share);
+    case Termination::work_limit:
+      return fmt::format("given up: that costs too much; {:.1e} of the weight out of balance", residual_share);
     case Termination::singular_tangent:
       return "the tangent matrix is singular";
     case Termination::line_search_failed:
@@ -68,7 +73,14 @@ std::string reason(Termination end, int iterations, double residual_share) {
 }  // namespace
 
 EquilibriumSolver::EquilibriumSolver(const Mechanics& mechanics, SolveOptions options)
-    : mechanics_(mechanics), options_(std::move(options)), sums_(mechanics.pattern()), direction_(mechanics) {}
+    : mechanics_(mechanics),
+      options_(std::move(options)),
+      sums_(mechanics.pattern()),
+      direction_(std::make_unique<NewtonDirection>(mechanics)) {}
+
+EquilibriumSolver::~EquilibriumSolver() = default;
+
+void EquilibriumSolver::forget() { direction_->forget(); }
 
 SolveReport EquilibriumSolver::forward(const Points& X, Points& x, const std::string& what, const Points* start) {
   return solve(Unknown::deformed, X, x, what, start);
@@ -78,18 +90,23 @@ SolveReport EquilibriumSolver::inverse(const Points& x, Points& X, const std::st
   return solve(Unknown::undeformed, x, X, what, start);
 }
 
+int EquilibriumSolver::work() const { return steps_ + work_of_factor * direction_->factorisations(); }
+
 SolveReport EquilibriumSolver::solve(Unknown unknown, const Points& known, Points& sought, const std::string& what,
                                      const Points* start) {
   mechanics_.evaluate(State{.x = known, .X = known, .load = 1.0}, Demand{.residual = true}, sums_);
   weight_norm_ = sums_.residual.norm();
-  const int factorised_before = direction_.factorisations();
+  // A body that floats has no weight to compare with: it is balanced where only rounding is left.
+  if (weight_norm_ < rounding_mn) weight_norm_ = rounding_mn / std::max(options_.residual_tolerance, 1e-16);
+  const int factorised_before = direction_->factorisations(), work_before = work();
+  solve_end_ = std::min(work_end_, work_before + options_.most_work);
   what_ = what;
   if (start != nullptr) {
     sought = *start;
     const Attempt attempt = newton({.unknown = unknown, .known = known, .load = 1.0}, sought);
     if (converged(attempt.end))
       return {.newton_iterations = attempt.iterations,
-              .factorisations = direction_.factorisations() - factorised_before,
+              .factorisations = direction_->factorisations() - factorised_before,
               .load_steps = 1,
               .min_det_f = attempt.min_det_f,
               .residual_share = attempt.residual_share,
@@ -97,7 +114,7 @@ SolveReport EquilibriumSolver::solve(Unknown unknown, const Points& known, Point
   }
   sought = known;
   SolveReport report = step_load(unknown, known, sought);
-  report.factorisations = direction_.factorisations() - factorised_before;
+  report.factorisations = direction_->factorisations() - factorised_before;
   return report;
 }
 
@@ -128,7 +145,7 @@ SolveReport EquilibriumSolver::step_load(Unknown unknown, const Points& known, P
     failed = target;
     step = 0.5 * (target - load);
     const bool crushed = last.end != Termination::inverted && last.min_det_f < crushed_det_f;
-    if (step < options_.smallest_load_step * (crushed ? crushed_step_factor : 1))
+    if (last.end == Termination::work_limit || step < options_.smallest_load_step * (crushed ? crushed_step_factor : 1))
       throw NoEquilibrium(failure(last, load, trial), load);
   }
   sought = at_load;
@@ -187,7 +204,7 @@ EquilibriumSolver::Attempt EquilibriumSolver::newton(const Problem& problem, Poi
     measure(attempt);
     if (const auto end = unusable(attempt)) return ended(*end);
     if (options_.progress) options_.progress(what_, problem.load, attempt.iterations, attempt.residual_share);
-    if (const auto end = settled(attempt)) return ended(*end);
+    if (const auto end = settled(attempt, by_energy(problem))) return ended(*end);
     if (!find_step(problem, sought, attempt, step)) return ended(Termination::singular_tangent);
     if (!search_line(problem, attempt, step, sought)) return ended(Termination::line_search_failed);
   }
@@ -213,29 +230,45 @@ std::optional<Termination> EquilibriumSolver::unusable(const Attempt& attempt) c
 }
 
 /// Whether the answer is found, or further steps will not find it.
-std::optional<Termination> EquilibriumSolver::settled(Attempt& attempt) const {
+std::optional<Termination> EquilibriumSolver::settled(Attempt& attempt, bool by_energy) const {
   const double share = attempt.residual_share;
   if (share <= options_.residual_tolerance) return Termination::residual_small;
-  if (attempt.moved_mm < options_.step_tolerance_mm && direction_.exact() && share <= loosest_residual_share)
+  if (attempt.moved_mm < options_.step_tolerance_mm && direction_->exact() && share <= loosest_residual_share)
     return Termination::step_small;
-  if (attempt.iterations % stall_window == 0) {
-    if (share > stall_share * attempt.share_at_window) return Termination::stalled;
-    attempt.share_at_window = share;
-  }
+  if (creeps(attempt, by_energy)) return Termination::stalled;
   if (attempt.iterations == options_.max_iterations) return Termination::iteration_limit;
+  if (work() >= solve_end_) return Termination::work_limit;
   return std::nullopt;
+}
+
+/// Whether neither residual nor energy fell much in the window that ends here. The energy of a shape far from the
+/// answer falls for long before the residual does.
+bool EquilibriumSolver::creeps(Attempt& attempt, bool by_energy) const {
+  if (attempt.iterations % stall_window != 0) return false;
+  if (attempt.iterations == 0) attempt.energy_at_start = sums_.energy;
+  const double fall = attempt.energy_at_window - sums_.energy, whole = attempt.energy_at_start - sums_.energy;
+  const bool falls = by_energy && fall > energy_share * whole && fall > energy_rounding * std::abs(sums_.energy);
+  const bool creeping =
+      attempt.iterations > 0 && !falls && attempt.residual_share > stall_share * attempt.share_at_window;
+  attempt.share_at_window = attempt.residual_share;
+  attempt.energy_at_window = sums_.energy;
+  return creeping;
+}
+
+bool EquilibriumSolver::by_energy(const Problem& problem) const {
+  return problem.unknown == Unknown::deformed && mechanics_.has_energy();
 }
 
 /// The next Newton step, no longer than longest_step_mm. @return false when there is none
 bool EquilibriumSolver::find_step(const Problem& problem, const Points& sought, Attempt& attempt,
                                   Eigen::VectorXd& step) {
-  ++attempt.iterations;
+  ++attempt.iterations, ++steps_;
   const State state = state_of(problem, sought);
   const double tolerance = linear_tolerance(attempt.residual_share, attempt.share_before, options_.residual_tolerance);
   attempt.share_before = attempt.residual_share;
   const bool found = problem.unknown == Unknown::deformed
-                         ? direction_.deformed(state, tolerance, attempt.moved_mm, sums_, step)
-                         : direction_.undeformed(state, tolerance, sums_, step);
+                         ? direction_->deformed(state, tolerance, attempt.moved_mm, sums_, step)
+                         : direction_->undeformed(state, tolerance, sums_, step);
   if (!found) return false;
   const double longest = step.cwiseAbs().maxCoeff();
   attempt.step_share = std::min(1.0, longest_step_mm / longest);
@@ -247,7 +280,7 @@ bool EquilibriumSolver::find_step(const Problem& problem, const Points& sought, 
 /// Moves @p sought along the step as far as lowers the merit. @return false, and @p sought as it was, where none does
 bool EquilibriumSolver::search_line(const Problem& problem, const Attempt& attempt, const Eigen::VectorXd& step,
                                     Points& sought) {
-  const bool by_energy = problem.unknown == Unknown::deformed && mechanics_.has_energy();
+  const bool by_energy = this->by_energy(problem);
   Line line{.start = sought,
             .step = step,
             .by_energy = by_energy,
@@ -271,7 +304,7 @@ bool EquilibriumSolver::search_line(const Problem& problem, const Attempt& attem
     if (!keeps_volume(line)) continue;
     if (last_digits) return true;  // the step moves by rounding only: no merit says anything
     if (!lowers_merit(problem, sought, line, alpha)) continue;
-    if (by_energy && halving == 0 && !direction_.exact()) go_further(problem, line, sought);
+    if (by_energy && halving == 0 && !direction_->exact()) go_further(problem, line, sought);
     return true;
   }
   sought = line.start;
@@ -311,8 +344,8 @@ bool EquilibriumSolver::lowers_merit(const Problem& problem, const Points& sough
     return mixed_norm(state_of(problem, sought), sums_.residual) <= (1 - sufficient_decrease * alpha) * line.mixed_norm;
   }
   if (sums_.residual.norm() <= (1 - sufficient_decrease * alpha) * line.residual_norm) return true;
-  if (!line.natural_mm) line.natural_mm = direction_.natural_mm(line.residual);
-  return direction_.natural_mm(sums_.residual) <= (1 - natural_decrease * alpha) * *line.natural_mm;
+  if (!line.natural_mm) line.natural_mm = direction_->natural_mm(line.residual);
+  return direction_->natural_mm(sums_.residual) <= (1 - natural_decrease * alpha) * *line.natural_mm;
 }
 
 bool EquilibriumSolver::keeps_volume(const Line& line) const {

@@ -3,17 +3,20 @@
 
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "common/error.h"
 #include "simulation/mechanics.h"
-#include "simulation/solve/newton_direction.h"
 
 namespace supine::simulation {
 
+class NewtonDirection;
+
 struct SolveOptions {
-  int max_iterations = 40;                ///< Newton steps per load step, >= 0
+  int max_iterations = 80;                ///< Newton steps per load step, >= 0
+  int most_work = 1500;                   ///< of one solve (EquilibriumSolver::work()), >= 0
   double step_tolerance_mm = 1e-8;        ///< of Termination::step_small, >= 0
   double residual_tolerance = 1e-11;      ///< of Termination::residual_small, share of the weight, >= 0
   double smallest_load_step = 1.0 / 128;  ///< share of the load, in (0, 1]
@@ -25,9 +28,13 @@ struct SolveOptions {
 inline constexpr double loosest_residual_share = 1e-4;
 /// An element that comes to this det F is on its way through zero, where laws without a barrier let it pass.
 inline constexpr double crushed_det_f = 1e-3;
-/// Iterations in which the residual must fall to stall_share of what it was: a tangent that keeps being changed creeps.
+/// Iterations in which the residual must fall to stall_share of what it was, or the energy by energy_share of what it
+/// has fallen since the load step began: a tangent that keeps being changed creeps.
 inline constexpr int stall_window = 12;
 inline constexpr double stall_share = 0.5;
+inline constexpr double energy_share = 0.02;
+/// A factorisation costs about as much as so many Newton steps without one (linear cells, 10,000 nodes).
+inline constexpr int work_of_factor = 4;
 /// Of a Newton step: where 1/4096 of it is still too long, shorter load steps help more than shorter Newton steps.
 inline constexpr int max_halvings = 12;
 
@@ -40,9 +47,11 @@ enum class Termination {
   // ----
   inverted,            ///< det F <= 0, or det ∂X/∂ξ <= 0 in an element, in the shape Newton's method starts from
   crushed,             ///< 0 < det F < crushed_det_f after a step
-  stalled,             ///< |r_k| > stall_share |r_(k - stall_window)| at iteration k, a multiple of stall_window
+  stalled,             ///< |r_k| > stall_share |r_(k - stall_window)| at iteration k, a multiple of stall_window, and
+                       ///< W_(k - stall_window) - W_k < energy_share (W_0 - W_k) where the merit is the energy W
   iteration_limit,     ///< max_iterations steps were taken
   singular_tangent,    ///< NewtonDirection found no step
+  work_limit,          ///< more work than SolveOptions::most_work, or than limit_work() leaves
   line_search_failed,  ///< no 2^-h of the step, h = 0 .. max_halvings, lowers the merit and keeps det F
 };
 
@@ -79,6 +88,7 @@ class EquilibriumSolver {
  public:
   /// @param mechanics  must outlive the object; its fields may be set anew between solves
   explicit EquilibriumSolver(const Mechanics& mechanics, SolveOptions options = {});
+  ~EquilibriumSolver();
 
   /// Deformed shape for a known undeformed one. Merit: energy (for a law without energy that of inverse()).
   /// @param X  undeformed nodes, #N by 3, mm
@@ -94,8 +104,15 @@ class EquilibriumSolver {
   /// Parameters and errors as of forward(), with x and X changing places.
   SolveReport inverse(const Points& x, Points& X, const std::string& what, const Points* start = nullptr);
 
+  /// What was spent since the object was made, failed load steps included: Newton steps, and for each factorisation
+  /// work_of_factor more. Counted, not timed, so that it is the same on every machine.
+  int work() const;
+  /// What solves from now on may cost together, beside SolveOptions::most_work of each; beyond it they end with
+  /// NoEquilibrium. Until it is called again; nullopt = no such bound.
+  void limit_work(std::optional<int> most) { work_end_ = most ? work() + *most : unlimited; }
+
   /// Forgets what earlier solves left behind to save work, so that the next ones give the same bytes as after making.
-  void forget() { direction_.forget(); }
+  void forget();
 
  private:
   enum class Unknown { deformed, undeformed };
@@ -114,10 +131,11 @@ class EquilibriumSolver {
     int min_cell = -1;
     Eigen::Index worst_node = 0;  ///< furthest out of balance
     double residual_share = 0;
-    double share_before = 1;               ///< residual_share one iteration before
-    double share_at_window = unknown_yet;  ///< residual_share when the present stall_window began
-    double moved_mm = unknown_yet;         ///< largest part of the last step along an axis
-    double step_share = 1;                 ///< of the last Newton step, what longest_step_mm left of it
+    double share_before = 1;                           ///< residual_share one iteration before
+    double share_at_window = unknown_yet;              ///< residual_share when the present stall_window began
+    double energy_at_window = 0, energy_at_start = 0;  ///< of the sums, where the merit is the energy
+    double moved_mm = unknown_yet;                     ///< largest part of the last step along an axis
+    double step_share = 1;                             ///< of the last Newton step, what longest_step_mm left of it
   };
   /// The line that a Newton step draws, and what is known where it starts.
   struct Line {
@@ -142,7 +160,9 @@ class EquilibriumSolver {
   Attempt newton(const Problem& problem, Points& sought);
   void measure(Attempt& attempt) const;
   std::optional<Termination> unusable(const Attempt& attempt) const;
-  std::optional<Termination> settled(Attempt& attempt) const;
+  std::optional<Termination> settled(Attempt& attempt, bool by_energy) const;
+  bool creeps(Attempt& attempt, bool by_energy) const;
+  bool by_energy(const Problem& problem) const;
   bool find_step(const Problem& problem, const Points& sought, Attempt& attempt, Eigen::VectorXd& step);
 
   bool search_line(const Problem& problem, const Attempt& attempt, const Eigen::VectorXd& step, Points& sought);
@@ -160,11 +180,15 @@ class EquilibriumSolver {
   const Mechanics& mechanics_;
   SolveOptions options_;
   Sums sums_;
-  NewtonDirection direction_;
+  std::unique_ptr<NewtonDirection> direction_;
   double weight_norm_ = 0;
   Eigen::VectorXd volume_strain_;   // q of VolumeStrainTerm at the shape of the sums; empty where it is not followed
   Eigen::VectorXd mixed_residual_;  // work space
-  std::string what_;                // the solve under way, for progress and messages
+  static constexpr int unlimited = std::numeric_limits<int>::max();
+  int steps_ = 0;              // Newton steps since the object was made
+  int work_end_ = unlimited;   // of work(): bound of limit_work()
+  int solve_end_ = unlimited;  // of work(): bound of the solve under way
+  std::string what_;           // the solve under way, for progress and messages
 };
 
 }  // namespace supine::simulation

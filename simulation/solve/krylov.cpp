@@ -4,7 +4,6 @@
 #include <Eigen/Jacobi>
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace supine::simulation {
 namespace {
@@ -52,7 +51,6 @@ KrylovReport Krylov::conjugate_gradients(const LinearMap& matrix, const LinearMa
 KrylovReport Krylov::gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b,
                            const KrylovOptions& options, Eigen::VectorXd& x) {
   const int max_iterations = options.max_iterations;
-  z_.resize(size_);
   q_.resize(size_);
   if (basis_.cols() < max_iterations + 1) basis_.resize(size_, max_iterations + 1);
   KrylovReport report;
@@ -67,9 +65,10 @@ KrylovReport Krylov::gmres(const LinearMap& matrix, const LinearMap& preconditio
   std::vector<Eigen::JacobiRotation<double>> rotations(max_iterations);
   int k = 0;
   while (k < max_iterations && !report.converged) {
+    if (static_cast<int>(preconditioned_.size()) == k) preconditioned_.emplace_back(size_);
     q_ = basis_.col(k);
-    preconditioner(q_, z_);
-    matrix(z_, q_);
+    preconditioner(q_, preconditioned_[k]);
+    matrix(preconditioned_[k], q_);
     for (int pass = 0; pass < gram_schmidt_passes; ++pass) {
       const Eigen::VectorXd along = basis_.leftCols(k + 1).transpose() * q_;
       q_.noalias() -= basis_.leftCols(k + 1) * along;
@@ -87,8 +86,7 @@ KrylovReport Krylov::gmres(const LinearMap& matrix, const LinearMap& preconditio
   }
   report.iterations = k;
   const Eigen::VectorXd y = h.topLeftCorner(k, k).triangularView<Eigen::Upper>().solve(g.head(k));
-  q_.noalias() = basis_.leftCols(k) * (norm * y);
-  preconditioner(q_, x);
+  for (int i = 0; i < k; ++i) x += (norm * y[i]) * preconditioned_[i];
   return report;
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <limits>
+#include <vector>
 
 #include "simulation/elements/assembly.h"
 
@@ -40,16 +41,17 @@ class Krylov {
   KrylovReport conjugate_gradients(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b,
                                    const KrylovOptions& options, Eigen::VectorXd& x);
 
-  /// GMRES without restart (Saad and Schultz 1986), preconditioned from the right so that its residual is the true
-  /// one, from x = 0; any regular A. Parameters as of conjugate_gradients(); the basis takes max_iterations + 1 vectors
-  /// of memory.
+  /// Flexible GMRES without restart (Saad 1993), preconditioned from the right so that its residual is the true one, in
+  /// single precision too; from x = 0; any regular A. Parameters as of conjugate_gradients(); the bases take
+  /// max_iterations + 1 and as many vectors of memory as there were iterations.
   KrylovReport gmres(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b,
                      const KrylovOptions& options, Eigen::VectorXd& x);
 
  private:
   Eigen::Index size_;
-  Eigen::VectorXd r_, z_, p_, q_;  // residual, preconditioned residual, direction, A times direction
-  Eigen::MatrixXd basis_;          // of GMRES, one vector per column
+  Eigen::VectorXd r_, z_, p_, q_;                // residual, preconditioned residual, direction, A times direction
+  Eigen::MatrixXd basis_;                        // of GMRES, one vector per column
+  std::vector<Eigen::VectorXd> preconditioned_;  // what the preconditioner made of each
 };
 
 }  // namespace supine::simulation

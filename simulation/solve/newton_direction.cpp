@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "simulation/solve/p_multigrid.h"
 #include "simulation/solve/pushed_forward.h"
 
 namespace supine::simulation {
@@ -24,7 +25,8 @@ constexpr double close_mm = 1;            // a kept factor is worth trying after
 constexpr double many_solves = 40;        // or where a new one costs as much as so many solves
 constexpr double usable_reduction = 0.5;  // a linear solve that got this far is still a direction
 constexpr double worth_reduction = 0.1;   // and this far one that saves a new factor
-constexpr int undeformed_tries = 2;       // with the kept factor, then with a new one
+constexpr int undeformed_tries = 3;  // with what is kept, then made anew, then with a factor where that was a cycle
+constexpr Eigen::Index least_cycling = 3000;  // unknowns: a factor of fewer is as cheap as anything
 
 }  // namespace
 
@@ -47,7 +49,7 @@ bool NewtonDirection::deformed(const State& state, double tolerance, double move
     const auto preconditioner = [this](const Eigen::VectorXd& in, Eigen::VectorXd& out) { factor_->solve(in, out); };
     return by_gmres(sums.tangent, preconditioner, tolerance, sums, step);
   }
-  if (have_factor_ && !renew_factor_ && (close || factor_->solves_per_factor() >= many_solves)) {
+  if (have_factor_ && !renew_factor_ && !cycling() && (close || factor_->solves_per_factor() >= many_solves)) {
     const int affordable = iterations_per_factor(least_conjugate_gradients, max_conjugate_gradients);
     if (by_conjugate_gradients(tolerance, 0, affordable, sums, step)) return true;
   }
@@ -76,7 +78,8 @@ bool NewtonDirection::undeformed(const State& state, double tolerance, Sums& sum
     }
     exact_ = true;  // the factor may be of a changed tangent, GMRES solves with the matrix itself
     if (by_gmres(sums.reference_tangent, preconditioner, tolerance, sums, step)) return true;
-    if (fresh) return false;
+    if (fresh && !cycling()) return false;
+    if (fresh) cycle_failed_ = true;
     renew_factor_ = true;
   }
   return false;
@@ -88,11 +91,20 @@ double NewtonDirection::natural_mm(const Eigen::VectorXd& residual) {
   return preconditioned_residual_.norm();
 }
 
+/// Points factor_ at what suits mesh and material.
+void NewtonDirection::choose_solver(const SparseMatrix& pattern) {
+  const bool cycle = mechanics_.mesh().order() == 2 && pattern.cols() >= least_cycling && !cycle_failed_ &&
+                     !mechanics_.volume().nearly_incompressible();
+  if (cycle && !cycle_) cycle_ = std::make_unique<PMultigrid>(pattern, mechanics_.mesh().cells);
+  if (!cycle && !large_) large_ = make_spd_solver(pattern, mechanics_.mesh().points);
+  factor_ = cycle ? cycle_.get() : large_.get();
+}
+
 /// Renews the kept factor.
 /// @param close  whether the last step was short
 /// @param step   the Newton step with the new factor, or nullptr when only the factor is wanted
 bool NewtonDirection::factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step) {
-  if (!factor_) factor_ = make_spd_solver(sums.tangent, mechanics_.mesh().points);
+  choose_solver(sums.tangent);
   // The exact tangent where it is positive definite; where it is not, the one without the skin's negative curvature;
   // and if the tissue's is negative too, with a shift not much larger than makes it so: tried from a little under the
   // last one that did.
@@ -108,16 +120,29 @@ bool NewtonDirection::factorise(const State& state, double tolerance, bool close
     ++factorisations_;
     const bool exact = tangent == exact_tangent;
     exact_ = exact;
-    if (!factor_->factorise(sums.tangent, shift)) continue;
+    if (!factor_->factorise(sums.tangent, shift)) {
+      if (cycling() && close) return with_factor_instead(state, tolerance, close, sums, step);
+      continue;
+    }
     renew_factor_ = false;
     const bool found = step == nullptr || step_with_new_factor(state, tolerance, shift, close, sums, *step);
     // A cycle of multigrid is no factor: it is good for a changed tangent, not for what that was changed from.
     if (!exact && !factor_->direct()) renew_factor_ = true;
     if (found && !exact) shift_ = shift;
     if (found) return true;
+    // Near the answer a changed tangent creeps, and its cycle is too poor for the exact one: a factor serves there.
+    if (cycling() && (close || !indefinite_)) return with_factor_instead(state, tolerance, close, sums, step);
   }
   have_factor_ = false;
   return false;
+}
+
+/// The same where p-multigrid has come to no solution.
+bool NewtonDirection::with_factor_instead(const State& state, double tolerance, bool close, Sums& sums,
+                                          Eigen::VectorXd* step) {
+  cycle_failed_ = true;
+  if (!exact_) mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true}, sums);
+  return factorise(state, tolerance, close, sums, step);
 }
 
 /// The step with the factor just made of sums.tangent + shift I.

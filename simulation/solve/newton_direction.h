@@ -12,11 +12,13 @@ namespace supine::simulation {
 /// Newton steps for one Mechanics: solves ∂r/∂x s = -r or ∂r/∂X s = -r.
 ///
 /// One factor of ∂r/∂x (or, on large meshes, one multigrid hierarchy) is kept and used as preconditioner for as long as
-/// Krylov iterations with it are cheaper than a new one. Where ∂r/∂x is not positive definite a changed one that is
-/// gets factorised, and close to the answer conjugate gradients with it on ∂r/∂x itself find the step, up to where they
-/// meet a direction of negative curvature: the changed tangent alone is too stiff and creeps. -∂r/∂X is close to
-/// ∂r/∂x F (moving a point of the body together with its place leaves what is balanced balanced), so the same factor
-/// serves the inverse solve, whose matrix is not symmetric and would cost three times as much to factorise.
+/// Krylov iterations with it are cheaper than a new one. On quadratic cells a cycle of p-multigrid stands in its place,
+/// made anew for every tangent; where cells are nearly incompressible, or it does not come to a solution, the factor.
+/// Where ∂r/∂x is not positive definite a changed one that is gets factorised, and close to the answer conjugate
+/// gradients with it on ∂r/∂x itself find the step, up to where they meet a direction of negative curvature: the
+/// changed tangent alone is too stiff and creeps. -∂r/∂X is close to ∂r/∂x F (moving a point of the body together with
+/// its place leaves what is balanced balanced), so the same factor serves the inverse solve, whose matrix is not
+/// symmetric and would cost three times as much to factorise.
 class NewtonDirection {
  public:
   /// @param mechanics  must outlive the object
@@ -42,7 +44,7 @@ class NewtonDirection {
   double natural_mm(const Eigen::VectorXd& residual);
 
   /// Forgets the kept factor, so that what follows does not depend on what was solved before.
-  void forget() { have_factor_ = false, shift_ = 0; }
+  void forget() { have_factor_ = false, shift_ = 0, cycle_failed_ = false; }
 
   /// Whether the last step came from the exact tangent: its length then says how far the answer is.
   bool exact() const { return exact_; }
@@ -51,6 +53,7 @@ class NewtonDirection {
 
  private:
   bool factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step);
+  bool with_factor_instead(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step);
   bool step_with_new_factor(const State& state, double tolerance, double shift, bool close, Sums& sums,
                             Eigen::VectorXd& step);
   bool by_conjugate_gradients(double tolerance, double shift, int max_iterations, const Sums& sums,
@@ -58,16 +61,20 @@ class NewtonDirection {
   bool by_gmres(const SparseMatrix& matrix, const LinearMap& preconditioner, double tolerance, const Sums& sums,
                 Eigen::VectorXd& step);
   int iterations_per_factor(int least, int most) const;
+  void choose_solver(const SparseMatrix& pattern);
+  bool cycling() const { return factor_ != nullptr && factor_ == cycle_.get(); }
 
   const Mechanics& mechanics_;
-  std::unique_ptr<SpdSolver> factor_;
+  std::unique_ptr<SpdSolver> cycle_, large_;  // p-multigrid; what make_spd_solver() gives
+  SpdSolver* factor_ = nullptr;               // one of them: the one made last
   Krylov krylov_;
   Eigen::VectorXd preconditioned_residual_;  // work space
   bool have_factor_ = false;
   bool renew_factor_ = false;  // the last Krylov solve cost more than a new factor would
   bool exact_ = true;
-  bool indefinite_ = false;  // this step's exact tangent has shown negative curvature: it has no Cholesky factor
-  double shift_ = 0;         // of the tangent that was factorised last when the exact one was not positive definite
+  bool indefinite_ = false;    // this step's exact tangent has shown negative curvature: it has no Cholesky factor
+  double shift_ = 0;           // of the tangent that was factorised last when the exact one was not positive definite
+  bool cycle_failed_ = false;  // p-multigrid did not come to a solution: not tried again
   int factorisations_ = 0;
 };
 

@@ -73,8 +73,8 @@ struct Sensitivities::State {
   Model model;
   ChainSolution solution;
   Sums sums;
-  SparseMatrix prone_tangent;  // ∂r/∂x of prone: what moving the known shape does
-  std::optional<Borrowed<LuSolver>> inverse;
+  SparseMatrix prone_tangent;                            // ∂r/∂x of prone: what moving the known shape does
+  std::optional<Borrowed<LuSolver>> inverse;             // none where the body was imaged free of load
   std::vector<std::unique_ptr<TangentSolver>> tangents;  // per pose but prone
   std::vector<SparseMatrix> reference_tangents;          // ∂r/∂X, per pose but prone
 
@@ -115,8 +115,11 @@ struct Sensitivities::State {
     ChainDerivative result;
     Flat force = force_derivative(0, what, &result.prone);
     const Flat prone = flat(result.prone);
-    if (!prone.isZero(0)) force += prone_tangent * prone;
-    const Flat undeformed = -(*inverse)->solve(force);
+    Flat undeformed = prone;  // of a body imaged free of load
+    if (inverse) {
+      if (!prone.isZero(0)) force += prone_tangent * prone;
+      undeformed = -(*inverse)->solve(force);
+    }
     result.X = shaped(undeformed);
     for (std::size_t p = 1; p < chain.poses().size(); ++p) {
       const Flat pull = force_derivative(p, what, nullptr) + reference_tangents[p - 1] * undeformed;
@@ -129,9 +132,10 @@ struct Sensitivities::State {
 Sensitivities::Sensitivities(Chain& chain, const Model& model, const ChainSolution& solution)
     : state_(std::make_unique<State>(chain, model, solution)) {
   State& s = *state_;
-  s.linearise(0);
+  if (!chain.imaged_free_of_load()) s.linearise(0);
   s.prone_tangent = s.sums.tangent;
-  if (!s.inverse.emplace(chain.spare_lu_, s.sums.reference_tangent)->factorise(s.sums.reference_tangent))
+  if (!chain.imaged_free_of_load() &&
+      !s.inverse.emplace(chain.spare_lu_, s.sums.reference_tangent)->factorise(s.sums.reference_tangent))
     throw NumericalFailure("the tangent of the undeformed shape is singular: no sensitivities");
   for (std::size_t p = 1; p < chain.poses().size(); ++p) {
     s.linearise(p);
@@ -161,13 +165,16 @@ Eigen::VectorXd Sensitivities::gradient(const std::vector<Points>& by_pose,
     adjoint[p] = s.tangents[p - 1]->solve_transposed(flat(by_pose.at(p - 1)));
     pull -= s.reference_tangents[p - 1].transpose() * adjoint[p];
   }
-  adjoint[0] = (*s.inverse)->solve_transposed(pull);
+  if (s.inverse) adjoint[0] = (*s.inverse)->solve_transposed(pull);
   Eigen::VectorXd gradient(parameters.size());
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     Points prone;
     Flat force = s.force_derivative(0, parameters[i], &prone);
-    if (!prone.isZero(0)) force += s.prone_tangent * flat(prone);
-    double slope = -adjoint[0].dot(force);
+    double slope = pull.dot(flat(prone));  // of a body imaged free of load
+    if (s.inverse) {
+      if (!prone.isZero(0)) force += s.prone_tangent * flat(prone);
+      slope = -adjoint[0].dot(force);
+    }
     for (std::size_t p = 1; p < adjoint.size(); ++p)
       slope -= adjoint[p].dot(s.force_derivative(p, parameters[i], nullptr));
     gradient[static_cast<Eigen::Index>(i)] = slope;

@@ -17,17 +17,20 @@ ContactMaterial<T> contact_material(const Fields<T>& fields, Eigen::Index p, dou
 
 template <class Face>
 InterfaceTerm<Face>::InterfaceTerm(const Indices& faces, const Pattern& pattern,
-                                   std::shared_ptr<const meshing::MuscleDistance> muscle)
+                                   std::shared_ptr<const meshing::MuscleDistance> muscle, Eigen::Index first_point)
     : elements_(faces, pattern),
       muscle_(std::move(muscle)),
+      first_point_(first_point),
       at_x_(elements_.count() * Face::points),
       at_X_(elements_.count() * Face::points) {}
 
 template <class Face>
 void InterfaceTerm<Face>::set_fields(const Fields<double>& fields) {
   material_.resize(at_x_.size());
-  for (std::size_t p = 0; p < material_.size(); ++p) material_[p] = contact_material(fields, p, 1.0);
-  rubs_ = (fields.interface_friction.array() > 0).any();
+  for (std::size_t p = 0; p < material_.size(); ++p)
+    material_[p] = contact_material(fields, first_point_ + static_cast<Eigen::Index>(p), 1.0);
+  rubs_ =
+      (fields.interface_friction.segment(first_point_, static_cast<Eigen::Index>(material_.size())).array() > 0).any();
 }
 
 template <class Face>
@@ -99,12 +102,13 @@ void InterfaceTerm<Face>::add_parameter_derivative(const State& state, const Fie
     const NodeRows<n> nodes = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
     for (int p = 0; p < Face::points; ++p) {
       const int index = e * Face::points + p;
-      if (constant({fields.interface_normal[index], fields.interface_tangential[index],
-                    fields.interface_friction[index], fields.muscle_offset[index]}))
+      const Eigen::Index row = first_point_ + index;
+      if (constant({fields.interface_normal[row], fields.interface_tangential[row], fields.interface_friction[row],
+                    fields.muscle_offset[row]}))
         continue;
       const auto& value = Face::table().value[p];
       const Point point = point_at(index, nodes.transpose() * value, rest.transpose() * value);
-      const auto force = contact_force(point.place, contact_material(fields, index, state.load));
+      const auto force = contact_force(point.place, contact_material(fields, row, state.load));
       const Eigen::Vector3d derivative(force[0].v[0], force[1].v[0], force[2].v[0]);
       const double area = face_point<Face>(rest, p).area;
       for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += area * value[a] * derivative;

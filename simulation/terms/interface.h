@@ -24,7 +24,9 @@ namespace supine::simulation {
 template <class Face>
 class InterfaceTerm : public Term {
  public:
-  InterfaceTerm(const Indices& faces, const Pattern& pattern, std::shared_ptr<const meshing::MuscleDistance> muscle);
+  /// @param first_point  row of the interface's fields that belongs to the first point of the first face
+  InterfaceTerm(const Indices& faces, const Pattern& pattern, std::shared_ptr<const meshing::MuscleDistance> muscle,
+                Eigen::Index first_point = 0);
 
   void set_fields(const Fields<double>& fields) override;
   void add(const State& state, const Demand& demand, Sums& sums) const override;
@@ -51,6 +53,7 @@ class InterfaceTerm : public Term {
 
   Elements elements_;
   std::shared_ptr<const meshing::MuscleDistance> muscle_;
+  Eigen::Index first_point_;
   std::vector<ContactMaterial<double>> material_;  // per point; offset at full load
   bool rubs_ = false;                              // friction somewhere
   // φ is asked for at the same X (or x) in every iteration of a solve that only moves the other one; each point

@@ -3,6 +3,7 @@
 """Cohorts of the small case: cohort_test.py SOURCE BIN SMALL_RUN. Through make, and through Snakemake where there is one."""
 
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -143,6 +144,53 @@ class Cohort(unittest.TestCase):
         self.assertNotEqual(said.returncode, 0)
         self.assertIn("does not answer, nothing was submitted", said.stdout)
         self.assertFalse((self.work / "out").exists())
+
+
+class PriorsOfAPopulation(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.work = pathlib.Path(folder.name)
+        self.case = self.work / "anna"
+        shutil.copytree(SMALL, self.case)
+
+    def calibrate(self, priors, name="anna"):
+        case = self.case.rename(self.work / name)
+        (self.work / "priors.json").write_text(json.dumps(priors))
+        if "[priors]" not in (case / "case.toml").read_text():
+            with (case / "case.toml").open("a") as file:
+                file.write('\n[priors]\ncohort = "../priors.json"\n')
+        said = run([BIN / "supine-calibrate", case, case / "out/mesh.vtu", "-o", self.work / "fit", "--threads", "1", "--force"])
+        case.rename(self.case)
+        return said
+
+    def told(self, median=2.5):
+        return {"numbers": [{"name": "breast.young_modulus_kpa", "patients": 3, "of_new": {"median": 3.0, "log_sd": 0.2},
+                             "left_out": [{"patient": "anna", "median": median, "log_sd": 0.1}]}]}
+
+    def prior(self):
+        coordinates = json.loads((self.work / "fit/calibration.json").read_text())["worth"]["coordinates"]
+        return next((c["prior_mean"], c["prior_sd"]) for c in coordinates if c["name"] == "breast.young_modulus_kpa")
+
+    def test_who_is_in_the_cohort_gets_what_the_others_say_and_another_what_all_do(self):
+        said = self.calibrate(self.told())
+        self.assertIn(said.returncode, (0, 1), said.stdout)
+        self.assertIn("this patient is left out", said.stdout)
+        mean, sd = self.prior()
+        self.assertAlmostEqual(mean, math.log(2.5), places=12)
+        self.assertAlmostEqual(sd, 0.1, places=12)
+        said = self.calibrate(self.told(), "berta")
+        self.assertIn("of which this patient is none", said.stdout)
+        self.assertAlmostEqual(self.prior()[0], math.log(3), places=12)
+
+    def test_what_is_no_cohort_or_says_nothing_of_the_model_is_refused(self):
+        for priors, message in (({"numbers": 3}, "is no cohort.json"), ({"numbers": []}, "says nothing of the free numbers"),
+                                (self.told(1e9), "has the median 1000000000"), (self.told(-1), "has the median -1")):
+            said = self.calibrate(priors)
+            self.assertEqual(said.returncode, 2, said.stdout)
+            self.assertIn(message, said.stdout)
+            self.assertIn("priors.json", said.stdout)
+        self.assertFalse((self.work / "fit/calibration.json").exists())
 
 
 class StagesOnTheWay(unittest.TestCase):

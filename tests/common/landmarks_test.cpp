@@ -56,6 +56,9 @@ TEST_F(LandmarksTest, RasIsTurnedToLps) {
 
 TEST_F(LandmarksTest, BadFilesAreRefusedWithTheLine) {
   expect_refused("x,y,z\n1,2,3\n", ":1");
+  expect_refused("name,x,y,z\n", "holds no landmark");
+  expect_refused("name,x,y,z\n ,1,2,3\n", "no name");
+  expect_refused("name,x,y,z\na,.01,.02,.03\nb,.02,.01,.03\nc,.05,.02,.07\n", "metres");
   expect_refused("name,x,y,z\na,1,2\n", ":2");
   expect_refused("name,x,y,z\na,1,2,three\n", "three");
   expect_refused("name,x,y,z\na,1,nan,3\n", "nan");

@@ -37,6 +37,16 @@ TEST_F(OutputsTest, FilesAppearTogetherOnCommit) {
   EXPECT_EQ(text(folder / "deep" / "b.txt"), "B");
 }
 
+TEST_F(OutputsTest, WhatAKilledProcessLeftIsRemovedAndWhatALivingOneWritesIsNot) {
+  const fs::path dead = folder / ".a.part999999999.txt", living = folder / ".a.part1.txt",
+                 other = folder / ".b.part999999999.txt";
+  for (const fs::path& file : {dead, living, other}) std::ofstream(file) << "half";
+  Outputs(false).stage(folder / "a.txt");
+  EXPECT_FALSE(fs::exists(dead));
+  EXPECT_TRUE(fs::exists(living));
+  EXPECT_TRUE(fs::exists(other));
+}
+
 TEST_F(OutputsTest, WithoutCommitNothingIsLeft) {
   {
     Outputs outputs(false);

@@ -28,6 +28,7 @@ DEAR = {
     "make bench": "hours",
     "make study": "an hour or more",
     "make hidden": "half an hour or more",
+    "make package": "builds; its result is tried by tests/package/package_test.sh",
     "make COHORT=": "names for the reader to replace; tests/cohort runs a cohort",
     "make CASE=path/to/case": "a name for the reader to replace; the same targets are run on a sample",
     "CASE_OUT=": "ParaView cannot be installed beside libvtk9-dev; tests/docs/paraview_arrays.py checks what the script opens",
@@ -152,7 +153,7 @@ def check_links(page):
 PATH = re.compile(r"(?:[\w.-]+/)*[\w.-]+\.(?:h|cpp|py|sh|awk|cmake|mjs|md)|(?:[\w.-]+/)+[\w.-]*|Makefile")
 ROOMS = ("bench", "calibration", "common", "diagnosis", "docs", "meshing", "phantom", "pipeline", "reconstruction", "registration",
          "samples",
-         "segmentation", "simulation", "tests")
+         "segmentation", "simulation", "tests", "warp")
 # Made by a run or by the reader, or the reader's own names.
 MADE = re.compile(r"(^|/)(out|build|answers)(/|$)|^(ladder|calibrated|overlays|dir|own|\d+)/|(^|[/_-])[A-Z]{2,}(?=[/_.-]|$)(?<!README)"
                   r"|(^|/)my\w*\.")

@@ -218,6 +218,37 @@ TEST(Labels, HoldTheBodysVolumeAndGrowWithTheSkin) {
   EXPECT_NEAR(at(0) - at(-1), 1e-3 * skin_area, 0.12e-3 * skin_area);
 }
 
+TEST(Labels, LeaveNoAirUnderABodyThatHangsOffTheMuscle) {
+  const Body body = draw_body(6);
+  const BodyMesh made = mesh_body(body, 6, coarse_rings, 1);
+  const Eigen::RowVector3d off = 5 * made.anatomy.outward.transpose();
+  Points hanging = made.mesh.points;
+  for (Eigen::Index n = 0; n < hanging.rows(); ++n) {
+    const Eigen::Vector3d local = body.local(hanging.row(n).transpose());
+    hanging.row(n) += std::max(0.0, 1 - std::pow(body.in_foot_radii(local.head<2>()), 2)) * off;
+  }
+  const auto labels = label_voxels(made, body, hanging, 6, {2, 0});
+  long air_under_tissue = 0, muscle_off = 0;
+  for (int k = 0; k < labels.grid.size.z(); ++k)
+    for (int i = 0; i < labels.grid.size.x(); ++i) {
+      bool muscle = false, air = false;  // from the back (+y) to the front
+      for (int j = labels.grid.size.y() - 1; j >= 0; --j) {
+        const auto label = static_cast<Label>(labels.voxels[labels.grid.index(i, j, k)]);
+        const Eigen::Vector3d at = labels.grid.point(Eigen::Vector3d(i, j, k));
+        if (body.in_foot_radii(body.local(at).head<2>()) > 0.6) continue;
+        muscle_off += label == Label::muscle && made.anatomy.muscle->value(at) > 2;
+        if (label == Label::muscle)
+          muscle = true;
+        else if (label == Label::air)
+          air = muscle;
+        else
+          air_under_tissue += air, air = false;
+      }
+    }
+  EXPECT_EQ(air_under_tissue, 0);
+  EXPECT_GT(muscle_off, 100);
+}
+
 TEST(Labels, HaveEveryTissueInEveryPhantom) {
   const Phantom phantom = make_phantom(coarse(7));
   std::array<std::size_t, 7> count{};

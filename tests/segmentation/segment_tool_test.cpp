@@ -48,6 +48,17 @@ TEST_F(SegmentTool, MapsLabelsAndTellsVolumes) {
   EXPECT_EQ(run("--force"), 0);
 }
 
+TEST_F(SegmentTool, KnowsItsRecipesByName) {
+  write_nrrd(folder_ / "mri.nrrd", image_);
+  write_case("mri.nrrd", "mri", "[segmentation]\nrecipe = \"t1_auot\"\n");
+  expect_refused(run(), "did you mean t1_auto?");
+  write_case("mri.nrrd", "mri", "[segmentation]\nrecipe = \"t1_auto\"\n");
+  const int code = run();  // the recipe is found and run; the block is no chest
+  expect_refused(code, "segmentation recipe, step");
+  expect_refused(run("--recipe fatsat_atuo"), "fatsat_auto");
+  EXPECT_EQ(run("--recipes"), 0);
+}
+
 TEST_F(SegmentTool, RunsARecipeAndComparesWithTheTruth) {
   GreyImage grey = image_;
   for (float& v : grey.voxels) v = v == 7 ? 100 : v == 40 ? 20 : 0;

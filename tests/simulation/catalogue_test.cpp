@@ -33,6 +33,7 @@ class CatalogueTest : public ::testing::TestWithParam<const Effect*> {
       scene.mesh.fraction(c, static_cast<int>(segmentation::Tissue::gland)) = 0.4;
       scene.mesh.fraction(c, static_cast<int>(segmentation::Tissue::tumour)) = 0.1;
     }
+    testing::name_parts_and_support(scene.mesh);
   }
   Fields<Dual> with(const std::vector<Dual>& values, const std::string& pose = "supine") const {
     const Scene place{scene.mesh, scene.anatomy, layout, pose};

@@ -80,6 +80,31 @@ TestScene box_scene(int n, const Eigen::Vector3d& size_mm) {
   return scene;
 }
 
+void name_parts_and_support(meshing::TetMesh& mesh) {
+  mesh.part_names = {"left", "right"};
+  mesh.part_fraction.resize(mesh.cells.rows(), 2);
+  const double middle = (mesh.points.col(0).minCoeff() + mesh.points.col(0).maxCoeff()) / 2;
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
+    double x = 0;
+    for (int k = 0; k < 4; ++k) x += mesh.points(mesh.cells(c, k), 0) / 4;
+    mesh.part_fraction.row(c) << (x > middle ? 1 : 0), (x > middle ? 0 : 1);
+  }
+  mesh.support_names = {"clamp"};
+  mesh.muscle_support = Eigen::VectorXi::Zero(mesh.muscle.triangles.rows());
+}
+
+TestScene bar_scene(double length_mm, double width_mm, int along, int across) {
+  // box_mesh() holds z = 0: z becomes -x, so that the bar leaves its clamp in the direction of -x.
+  meshing::TetMesh mesh = box_mesh(across, across, along, {width_mm, width_mm, length_mm});
+  Eigen::Matrix3d turn;
+  turn << 0, 0, -1, 0, 1, 0, 1, 0, 0;
+  mesh = moved(std::move(mesh), turn, {0, -width_mm / 2, -width_mm / 2});
+  name_parts_and_support(mesh);
+  TestScene scene{quadratic(mesh), {}};
+  scene.anatomy = meshing::compute_anatomy(scene.mesh, "none", "undeformed");
+  return scene;
+}
+
 const TestScene& two_breasts_scene() {
   static const TestScene scene = [] {
     TestScene made;

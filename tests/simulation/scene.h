@@ -24,6 +24,13 @@ const TestScene& dome_scene(int order = 1);
 /// Two breasts of one piece over one flat muscle, sagging along -y when prone; the right one is the smaller. Made once.
 const TestScene& two_breasts_scene();
 
+/// Two parts, "left" and "right" of the middle in x, and the muscle as a support named "clamp".
+void name_parts_and_support(meshing::TetMesh& mesh);
+
+/// A bar along x, from 0 to -length_mm, of a square section of width_mm, quadratic cells, held at x = 0 by the support
+/// "clamp"; free of load as imaged; parts as above.
+TestScene bar_scene(double length_mm, double width_mm, int along, int across);
+
 /// The same mesh with straight-sided quadratic elements.
 meshing::TetMesh quadratic(const meshing::TetMesh& linear);
 

@@ -156,7 +156,7 @@ TEST(Discrepancy, HasAMeanSquareOfOneAndIsACovariance) {
   Solved solved;
   const calibration::Clusters clusters = calibration::cluster_points(solved.residuals, 200);
   const Eigen::MatrixXd kernel =
-      discrepancy_kernel(solved.twin.mesh, solved.sensitivities, solved.prediction, solved.residuals, clusters);
+      discrepancy_of(solved.twin.mesh, solved.sensitivities, solved.prediction, solved.residuals, clusters).kernel;
   EXPECT_NEAR(kernel.diagonal().mean(), 1, 1e-9);
   EXPECT_LT((kernel - kernel.transpose()).norm(), 1e-9 * kernel.norm());
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(kernel).eigenvalues()[0], -1e-9 * kernel.norm());

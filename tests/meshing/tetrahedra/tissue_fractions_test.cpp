@@ -52,6 +52,18 @@ TEST(TissueFractions, HalfSpaceIsExactAwayFromTheBorder) {
   EXPECT_EQ(report.outside_share, 0);
 }
 
+TEST(TissueFractions, AShareOfGlandCountsInsteadOfTheLabel) {
+  auto mesh = testing::box_mesh(2, 2, 2, {20, 20, 20});
+  const LabelImage labels = half_space(1, 10);
+  const std::vector<float> share(labels.voxels.size(), 0.25f);
+  meshing::assign_tissue(mesh, labels, share);
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
+    EXPECT_NEAR(mesh.fraction(c, gland), 0.25, 1e-6);
+    EXPECT_NEAR(mesh.fraction(c, adipose), 0.75, 1e-6);
+    EXPECT_EQ(mesh.tissue[c], adipose);
+  }
+}
+
 TEST(TissueFractions, VolumesMatchTheVoxelsWhenTheBorderCutsCells) {
   auto mesh = testing::box_mesh(3, 3, 3, {20, 20, 20});
   const auto report = meshing::assign_tissue(mesh, half_space(0.5, 8));

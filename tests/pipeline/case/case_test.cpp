@@ -198,7 +198,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "file = \"labels.nrrd\"",
                 "file = \"volume.nrrd\"",
                 {":7", "file = \"volume.nrrd\"", "is not there"}},
-        BadCase{"UnknownKind", "kind = \"labels\"", "kind = \"ct\"", {"kind = \"ct\"", "labels or mri"}},
+        BadCase{"UnknownKind", "kind = \"labels\"", "kind = \"ct\"", {"kind = \"ct\"", "labels, mri or surface"}},
         BadCase{"NoLabels",
                 "[image.labels]\nair = [0]\nadipose = [1]\ngland = [29, 95, 125]\nmuscle = [40]\n",
                 "",
@@ -256,6 +256,81 @@ INSTANTIATE_TEST_SUITE_P(
                 "poses = [\"tilt45\"]",
                 {"[pose.tilt45]", "no surface"}}),
     [](const auto& place) { return place.param.name; });
+
+const std::string bar = R"([case]
+name = "bar"
+body = "object"
+[image]
+file = "bar.stl"
+kind = "surface"
+pose = "undeformed"
+[image.supports.clamp]
+point = [0, 0, 0]
+normal = [2, 0, 0]
+[image.supports.a_box]
+point = [10, 0, 0]
+normal = [0, 1, 0]
+faces = "beyond"
+[image.parts.tip]
+file = "bar.stl"
+[pose.hanging]
+gravity = [0, -1, 0]
+surface = "bar.stl"
+[pose.floating]
+gravity = [0, 0, 0]
+surface = "bar.stl"
+)";
+
+class ObjectCase : public CaseFile {
+ protected:
+  ObjectCase() { write_text(folder_ / "bar.stl", "x"); }
+};
+
+TEST_F(ObjectCase, NeedsNeitherSideNorProneNorSupine) {
+  const Case c = read(bar);
+  EXPECT_TRUE(c.is_object());
+  EXPECT_EQ(c.side, "none");
+  EXPECT_EQ(c.imaged().name, "undeformed");
+  EXPECT_TRUE(c.imaged().gravity.isZero(0));
+  ASSERT_EQ(c.poses.size(), 3u);
+  EXPECT_EQ(c.poses[1].name, "hanging");
+  EXPECT_EQ(c.calibrated_poses, (std::vector<std::string>{"hanging", "floating"}));
+  ASSERT_EQ(c.supports.size(), 2u);
+  EXPECT_EQ(c.supports[0].name, "clamp") << "in the order of the file";
+  EXPECT_EQ(c.supports[0].normal, Eigen::Vector3d(1, 0, 0));
+  EXPECT_TRUE(c.supports[1].beyond);
+  EXPECT_EQ(c.parts.at(0).file, folder_ / "bar.stl");
+}
+
+TEST_F(ObjectCase, WhatCannotBeMeantIsRefused) {
+  const auto complaint_of = [&](const std::string& from, const std::string& to) {
+    return input_error([&] { read(replaced(bar, from, to)); });
+  };
+  expect_words(complaint_of("body = \"object\"", "body = \"object\"\nside = \"left\""),
+               {"[case] side", "leave it out"});
+  expect_words(complaint_of("pose = \"undeformed\"\n", ""), {"[image] pose", "missing"});
+  expect_words(complaint_of("pose = \"undeformed\"", "pose = \"lying\""), {"[pose.lying]", "missing"});
+  expect_words(complaint_of("[image.supports.a_box]", "[image.supports.clamp]"), {"clamp"});
+  expect_words(complaint_of("file = \"bar.stl\"\n[pose", "file = \"bar.stl\"\npoint = [0, 0, 0]\n[pose"),
+               {"[image.parts.tip] point", "one of the two"});
+  expect_words(complaint_of("normal = [2, 0, 0]\n", ""), {"normal", "missing"});
+  expect_words(complaint_of("normal = [2, 0, 0]", "normal = [0, 0, 0]"), {"normal", "is zero"});
+  expect_words(
+      complaint_of("[image.supports.clamp]\npoint = [0, 0, 0]\nnormal = [2, 0, 0]\n[image.supports.a_box]\npoint = "
+                   "[10, 0, 0]\nnormal = [0, 1, 0]\nfaces = \"beyond\"\n",
+                   ""),
+      {"[image] supports", "nothing holds the body"});
+  expect_words(complaint_of("gravity = [0, -1, 0]\nsurface = \"bar.stl\"", "gravity = [0, 0, 0]"), {"is zero"});
+}
+
+TEST_F(CaseFile, AnotherImagedPoseStandsInForProne) {
+  const Case c = read(replaced(replaced(replaced(good, "kind = \"labels\"", "kind = \"labels\"\npose = \"tilt45\""),
+                                        "[pose.prone]\ngravity = [0.0, -1.0, 0.0]\n", ""),
+                               "prone = \"prone_landmarks.csv\"", "tilt45 = \"prone_landmarks.csv\""));
+  EXPECT_EQ(c.imaged().name, "tilt45");
+  EXPECT_EQ(c.poses[1].name, "supine");
+  EXPECT_TRUE(c.prone_landmarks);
+}
 
 TEST_F(CaseFile, AFolderThatIsNotThereIsNamed) {
   expect_words(input_error([] { read_case("/no/such/case"); }), {"/no/such/case", "not there"});

@@ -65,6 +65,17 @@ TEST_F(Dicom, ChoosesASeriesByNumberDescriptionOrUid) {
     EXPECT_EQ(read_dicom(folder_.path(), wanted).series.uid, "1.2.3.5");
 }
 
+TEST_F(Dicom, FoldersInsideFoldersAreSearched) {
+  const GreyImage image = volume(Eigen::Matrix3d::Identity());
+  const fs::path study = folder_.path() / "patient" / "study";
+  for (const char* series : {"s1", "s2"}) fs::create_directories(study / series);
+  write_dicom_series(study / "s1", image);
+  write_dicom_series(study / "s2", image, {"1.2.3.5", "12", "dynamic", "FFP", ""});
+  EXPECT_EQ(list_dicom_series(folder_.path()).size(), 2u);
+  EXPECT_EQ(read_dicom(folder_.path(), "12").file.image.grid.size, image.grid.size);
+  EXPECT_NE(refusal().find("holds 2 series"), std::string::npos);
+}
+
 TEST_F(Dicom, RefusesAMissingSlice) {
   write_dicom_series(folder_.path(), volume());
   fs::remove(folder_ / "7_005.dcm");  // (7 k) mod 10 = 5: slice 5

@@ -55,6 +55,21 @@ TEST(LabelsIo, NotesTravelWithTheLabels) {
   EXPECT_TRUE(read_label_notes(folder / "bare.vti").empty());
 }
 
+TEST(LabelsIo, TheShareOfGlandTravelsWithTheLabels) {
+  const TemporaryFolder folder;
+  const LabelImage labels = some_labels();
+  std::vector<float> share(labels.voxels.size());
+  for (std::size_t n = 0; n < share.size(); ++n) share[n] = static_cast<float>(n % 5) / 4;
+  write_labels(labels, folder / "shared.vti", {}, share);
+  EXPECT_EQ(read_gland_share(folder / "shared.vti"), share);
+  EXPECT_EQ(read_labels(folder / "shared.vti").voxels, labels.voxels);
+  write_labels(labels, folder / "bare.vti");
+  EXPECT_TRUE(read_gland_share(folder / "bare.vti").empty());
+  share[3] = 1.5f;
+  write_labels(labels, folder / "wrong.vti", {}, share);
+  EXPECT_NE(message_of([&] { read_gland_share(folder / "wrong.vti"); }).find("1.5"), std::string::npos);
+}
+
 TEST(LabelsIo, RefusesValuesThatAreNoTissue) {
   const TemporaryFolder folder;
   write_vti(folder / "grey.vti", numbered_image());

@@ -78,8 +78,12 @@ double share_of(const LabelImage& labels, double back_y) {
 
 TEST(AutomaticT1, FindsBreastsChestAndPlanesOfATorso) {
   for (const double turn : {0.1}) {  // oblique
-    const auto result = run_recipe(torso(turn), recipe("t1_auto.toml"));
+    Recipe steps = recipe("t1_auto.toml");
+    for (Step& step : steps.steps)
+      if (auto* planes = std::get_if<Planes>(&step)) planes->ends = Planes::Ends::anatomy;
+    const auto result = run_recipe(torso(turn), steps);
     ASSERT_EQ(result.walls.size(), 1u);
+    EXPECT_TRUE(result.doubts.empty()) << result.doubts.front().what;
     for (const CutPlane& plane : result.planes) {
       if (plane.name == "sternum") {
         EXPECT_NEAR(plane.at_mm, 0, 2.6);
@@ -137,6 +141,36 @@ TEST(AutomaticT1, PlanesCanBePlacedByHandAndOneSideChosen) {
         ASSERT_GE(p.x(), -3);  // half a voxel and what the cleft is off
         ASSERT_LE(p.z(), 58);
       }
+}
+
+TEST(AutomaticT1, ReadersEndTheBreastWhereTheChestTurnsAndBelowTheFold) {
+  const auto result = run_recipe(torso(0), read_shipped_recipe("t1_auto"));
+  // Half way round an ellipse of half axes a, b the depth from its middle is b^2 / sqrt(a^2 + b^2).
+  const double turn_y = front_y + half_depth - half_depth * half_depth / std::hypot(half_width, half_depth);
+  const auto at = [&result](const std::string& name) -> double {
+    for (const CutPlane& plane : result.planes)
+      if (plane.name == name) return plane.at_mm;
+    return NAN;
+  };
+  EXPECT_NEAR(at("mid_axillary"), turn_y, 6);
+  EXPECT_EQ(at("inframammary_left"), at("inframammary_right"));
+  EXPECT_LT(at("inframammary_left"), -60);
+}
+
+TEST(AutomaticT1, TheCasesSideHoldsWhereTheRecipeNamesNone) {
+  Recipe left = read_shipped_recipe("t1_auto");
+  left.set_side(Planes::Side::left);
+  const auto result = run_recipe(torso(0), left);
+  double meshed = 0, of_the_right = 0;
+  for (int k = 0; k < 44; ++k)
+    for (int j = 0; j < 104; ++j)
+      for (int i = 0; i < 132; ++i) {
+        if (!is_meshed(static_cast<Tissue>(result.labels.at(i, j, k)))) continue;
+        ++meshed;
+        of_the_right += result.labels.grid.point(Eigen::Vector3d(i, j, k)).x() < -3;
+      }
+  EXPECT_GT(meshed, 1000);
+  EXPECT_EQ(of_the_right, 0);
 }
 
 TEST(AutomaticT1, RefusesAVolumeWithoutTwoBreasts) {

@@ -36,7 +36,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadStep{"UnknownStep", "do = \"treshold\"", 5, "do = \"treshold\": unknown step; did you mean threshold?"},
         BadStep{"StepLikeNoOther", "do = \"segment\"", 5,
                 "do = \"segment\": unknown step; known here: noise_floor, bias, smooth, threshold, grow, islands, "
-                "holes, combine, morph, layer, region, paint, body, chest, planes, otsu or march"},
+                "holes, combine, morph, layer, region, paint, body, chest, planes, otsu, march or gland"},
         BadStep{"NoStep", "mask = \"a\"", 4, "do: is missing and must be given"},
         BadStep{"StepIsANumber", "do = 3", 5, "do = 3: must be a text in quotes"},
         BadStep{"UnknownKey", "do = \"noise_floor\"\nair_below = 6\nsigma = 1", 7,

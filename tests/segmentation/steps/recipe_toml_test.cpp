@@ -104,11 +104,21 @@ TEST(RecipeToml, ReadsEveryKindOfStep) {
     mean = 100
     sd = 20
     stop_mm = 30
+    [[step]]
+    do = "gland"
+    mask = "a"
+    body = "b"
+    breast = "d"
+    chest = "c"
+    contrast = "bright"
+    failed_share = 2
   )");
   ASSERT_EQ(recipe.steps.size(), std::variant_size_v<Step>);
   for (std::size_t s = 0; s < recipe.steps.size(); ++s) EXPECT_EQ(recipe.steps[s].index(), s);
   EXPECT_EQ(std::get<Bias>(recipe.steps[1]).degree, 3);
   EXPECT_EQ(std::get<Bias>(recipe.steps[1]).level, 100);
+  EXPECT_EQ(std::get<Gland>(recipe.steps[17]).options.contrast, GlandOptions::Contrast::bright);
+  EXPECT_EQ(std::get<Gland>(recipe.steps[17]).options.failed_share, 2);
   EXPECT_EQ(std::get<Threshold>(recipe.steps[3]).grey.upper, 12.5f);
   const auto& grow = std::get<Grow>(recipe.steps[4]);
   EXPECT_EQ(grow.seeds_mm[1], Eigen::Vector3d(4.5, 5, 6));

@@ -22,10 +22,16 @@ GreyImage row(const std::vector<float>& greys) {
   return image;
 }
 
+Recipe recipe_of(std::vector<Step> steps) {
+  Recipe recipe;
+  recipe.steps = std::move(steps);
+  return recipe;
+}
+
 /// Runs the steps and paints the mask "m" as adipose (1).
 std::vector<int> run(const GreyImage& image, std::vector<Step> steps) {
   steps.push_back(Paint{"m", Tissue::adipose, {}});
-  const auto labels = run_recipe(image, {steps}).labels.voxels;
+  const auto labels = run_recipe(image, recipe_of(steps)).labels.voxels;
   return {labels.begin(), labels.end()};
 }
 
@@ -108,15 +114,15 @@ TEST(RunRecipe, MorphClosesGapsAndOpensBridges) {
 
 TEST(RunRecipe, PaintOverSomeTissuesOnly) {
   const GreyImage image = row({1, 2, 3});
-  const Recipe recipe{{Threshold{"left", {1, 1}, ""}, Combine{"all", {}, {"left"}}, Paint{"left", Tissue::skin, {}},
-                       Paint{"all", Tissue::gland, {}}, Combine{"any", {"left", "all"}, {}},
-                       Paint{"any", Tissue::muscle, {Tissue::gland}}}};
+  const Recipe recipe = recipe_of({Threshold{"left", {1, 1}, ""}, Combine{"all", {}, {"left"}},
+                                   Paint{"left", Tissue::skin, {}}, Paint{"all", Tissue::gland, {}},
+                                   Combine{"any", {"left", "all"}, {}}, Paint{"any", Tissue::muscle, {Tissue::gland}}});
   const auto labels = run_recipe(image, recipe).labels.voxels;
   EXPECT_EQ(labels, (std::vector<std::uint8_t>{3, 4, 4}));
 }
 
 TEST(RunRecipe, LogsEveryStep) {
-  const auto result = run_recipe(row({1, 2, 3}), {{Threshold{"m", {2, 3}, ""}, Paint{"m", Tissue::skin, {}}}});
+  const auto result = run_recipe(row({1, 2, 3}), recipe_of({Threshold{"m", {2, 3}, ""}, Paint{"m", Tissue::skin, {}}}));
   ASSERT_EQ(result.log.size(), 2u);
   EXPECT_EQ(result.log[0], "step 1 (threshold): m: 2 voxels, 0.0 ml");
 }
@@ -124,7 +130,7 @@ TEST(RunRecipe, LogsEveryStep) {
 TEST(RunRecipe, RefusesWhatCannotWorkAndNamesTheStep) {
   const GreyImage image = row({1, 2, 3});
   const Step all = Threshold{"m", {0, 9}, ""};
-  const auto message = [&](const Step& step) { return message_of([&] { run_recipe(image, {{all, step}}); }); };
+  const auto message = [&](const Step& step) { return message_of([&] { run_recipe(image, recipe_of({all, step})); }); };
   EXPECT_NE(
       message(Islands{"skin", 1, 0}).find("step 2 (islands): no earlier step made the mask \"skin\"; there are \"m\""),
       std::string::npos);

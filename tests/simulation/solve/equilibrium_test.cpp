@@ -171,6 +171,28 @@ TEST(Equilibrium, TooFewIterationsAreNamed) {
   }
 }
 
+TEST(Equilibrium, WorkThatCostsTooMuchIsGivenUp) {
+  try {
+    forward_box({.most_work = 1, .progress = {}});
+    FAIL() << "one Newton step was enough";
+  } catch (const NoEquilibrium& failure) {
+    EXPECT_NE(std::string(failure.what()).find("given up"), std::string::npos) << failure.what();
+  }
+}
+
+TEST(Chain, GivesUpWhereItsWorkIsLimitedAndOnlyThere) {
+  const BoxChain box;
+  Chain chain(box.scene.mesh, box.scene.anatomy, box.model, box_poses);
+  const ChainSolution free = chain.solve(box.model);
+  EXPECT_GT(free.work, free.inverse.newton_iterations + free.poses[0].report.newton_iterations);
+  chain.limit_work(free.work + 1);
+  EXPECT_EQ(chain.solve(box.model).poses[0].x, free.poses[0].x);
+  chain.limit_work(free.work / 2);
+  EXPECT_THROW(chain.solve(box.model), NoEquilibrium);
+  chain.limit_work({});
+  EXPECT_EQ(chain.solve(box.model).poses[0].x, free.poses[0].x);
+}
+
 TEST(Chain, ProneGravityIntoTheMuscleIsRefused) {
   const BoxChain chain;
   EXPECT_THROW(chain.solve({{"prone", -Eigen::Vector3d::UnitZ()}, {"supine", Eigen::Vector3d::UnitZ()}}), InputError);

@@ -25,6 +25,7 @@ testing::TestScene scene_with_tissues(int order) {
     scene.mesh.fraction(c, static_cast<int>(segmentation::Tissue::tumour)) = 0.1;
     scene.mesh.fraction(c, static_cast<int>(segmentation::Tissue::adipose)) = 0.9 - gland;
   }
+  testing::name_parts_and_support(scene.mesh);
   return scene;
 }
 

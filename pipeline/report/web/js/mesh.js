@@ -51,15 +51,20 @@
       shown("coarse.json", ["distance_mm"], 2), " mm from them, on average ", shown("coarse.json", ["mean_distance_to_input_mm"], 3), " mm.");
   };
   const certificate = () => {
-    const s = data.figures["supine.json"];
+    const { imaged, predicted } = data.case, file = `${predicted}.json`, s = data.figures[file];
     if (!s) return gap("simulate");
+    if (imaged === "undeformed")
+      return el("figure", { id: "figure-round-trip" }, el("p", { class: "title" }, "Undeformed shape"),
+        el("p", {}, "Imaged free of load: its shape is the undeformed one, there is no inverse and no round trip."),
+        el("p", {}, `Most compressed element, ${predicted}: det F = `, shown(file, ["min_det_f"], 3), "; ", shown(file, ["newton_iterations"], 0), ` Newton steps. Largest way to ${predicted}: `,
+          shown(file, ["displacement_from_prone_mm", "max"], 1), " mm."));
     const holds = s.round_trip_max_mm <= 1e-6;
     return el("figure", { id: "figure-round-trip" }, el("p", { class: "title" }, "Round-trip certificate"),
-      el("p", {}, el("strong", {}, holds ? "Holds. " : "Does not hold. "), "The undeformed shape, loaded with prone gravity again, ends ",
-        el("span", { class: "figure", "data-file": "supine.json", "data-path": '["round_trip_max_mm"]', "data-digits": "e" }, s.round_trip_max_mm.toExponential(1).replace("-", "−")),
+      el("p", {}, el("strong", {}, holds ? "Holds. " : "Does not hold. "), `The undeformed shape, loaded with ${imaged} gravity again, ends `,
+        el("span", { class: "figure", "data-file": file, "data-path": '["round_trip_max_mm"]', "data-digits": "e" }, s.round_trip_max_mm.toExponential(1).replace("-", "−")),
         " mm from the imaged nodes at most (bound 10⁻⁶ mm)."),
-      el("p", {}, "Most compressed element, supine: det F = ", shown("supine.json", ["min_det_f"], 3), "; ", shown("supine.json", ["newton_iterations"], 0), " Newton steps. Largest way from prone to supine: ",
-        shown("supine.json", ["displacement_from_prone_mm", "max"], 1), " mm."));
+      el("p", {}, `Most compressed element, ${predicted}: det F = `, shown(file, ["min_det_f"], 3), "; ", shown(file, ["newton_iterations"], 0), ` Newton steps. Largest way from ${imaged} to ${predicted}: `,
+        shown(file, ["displacement_from_prone_mm", "max"], 1), " mm."));
   };
 
   supine.mesh = () => section("mesh", "Image, mesh, certificate", certificate(), surface(), el("div", { class: "columns" }, volumes(), regions(), quality()),

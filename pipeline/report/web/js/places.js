@@ -24,7 +24,7 @@
       { title: "skin covered", key: "covered_fraction", n: true, show: (v) => number(100 * v, 0) + " %" }], rows);
   };
   const areas = (all) => {
-    const shown = all.filter((c) => c.pose === "supine" && c.figures.areas && c.figures.areas.length);
+    const shown = all.filter((c) => c.pose === data.case.predicted && c.figures.areas && c.figures.areas.length);
     if (!shown.length) return "";
     const names = shown[0].figures.areas.map((a) => a.name);
     const last = shown[shown.length - 1];
@@ -41,7 +41,7 @@
     return [supine.figure("areas-chart", `Mean signed distance per area, ${last.model}, mm`, supine.chart.bars("Mean signed distance per area",
       last.figures.areas.map((a) => ({ label: a.name, value: a.mean_signed_mm, cls: a.mean_signed_mm > 0 ? "s2" : "s1" })), "mm; right: the breast reaches further than the model", { sign: true, digits: 1 }),
     { rows: last.figures.areas, columns: [{ title: "area", key: "name" }, { title: "signed mean, mm", key: "mean_signed_mm", digits: 2 }] }),
-    supine.table_figure("areas", "Areas of the skin, supine, mm", columns, rows)];
+    supine.table_figure("areas", `Areas of the skin, ${data.case.predicted}, mm`, columns, rows)];
   };
   const landmarks = (all) => {
     const shown = all.filter((c) => c.figures.landmarks && c.figures.landmarks.length);

@@ -10,10 +10,10 @@ const { el, colours, shown, words } = supine;
 
 class View {
   constructor(holder) {
-    const last_compared = [...model.states].reverse().find((s) => model.comparison_of(s, "supine"));
+    const last_compared = [...model.states].reverse().find((s) => model.comparison_of(s, supine.data.case.predicted));
     const preferred = model.state_of("calibrated") || last_compared || model.states[0];
     this.state = preferred;
-    this.pose = preferred.poses.supine ? "supine" : Object.keys(preferred.poses)[0];
+    this.pose = preferred.poses[supine.data.case.predicted] ? supine.data.case.predicted : Object.keys(preferred.poses)[0];
     this.morph = 2;
     this.colour = model.distance_of(this.state, this.pose) ? "distance" : "plain";
     this.show = { skin: 1, organs: true, scan: "off", muscle: false, landmarks: true, labels: true, ghost: false };
@@ -73,17 +73,18 @@ class View {
       this.fit();
       this.set_morph(2);
     }).node : "";
-    this.morph_input = slider("from prone over undeformed to the pose", 100 * this.morph, 0, 200, (v) => this.set_morph(v / 100));
+    const { imaged } = supine.data.case;
+    this.morph_input = slider(`from ${imaged} over undeformed to the pose`, 100 * this.morph, 0, 200, (v) => this.set_morph(v / 100));
     const stop = (label, at) => el("button", { type: "button", "data-morph": at, onclick: () => this.go(at) }, label);
     const { show } = this, both = supine.data.case.side === "both";
     const set = (key) => (value) => { show[key] = value; this.update(); };
-    this.panel.replaceChildren(rung.node, pose, group("Shape", this.morph_input, el("div", { class: "stops" }, stop("prone", 0), stop("undeformed", 1), stop(this.pose, 2))),
+    this.panel.replaceChildren(rung.node, pose, group("Shape", this.morph_input, el("div", { class: "stops" }, imaged === "undeformed" ? "" : stop(imaged, 0), stop("undeformed", 1), stop(this.pose, 2))),
       choice("Colour of the skin", [{ id: "distance", label: "distance" }, { id: "region", label: "regions" }, { id: "plain", label: "plain" }], this.colour, (id) => { this.colour = id; this.update(); }).node,
       group("Show", el("div", {}, "skin, from see-through to solid", slider("opacity of the skin", 100 * show.skin, 0, 100, (v) => set("skin")(v / 100))),
         model.organs.length ? check_box(model.organs.map((o) => o.name).join(", "), show.organs, set("organs"), colours.organ[model.organs[0].name]) : "",
         picker("measured scan ", [["off", "off"], ["points", "points"], ["surface", "surface"]], show.scan, set("scan")),
         check_box("landmarks (● predicted, ○ measured)", show.landmarks, set("landmarks")), check_box("names of what is off", show.labels, set("labels")),
-        check_box("prone shape beside it", show.ghost, set("ghost")), check_box("chest muscle", show.muscle, set("muscle"))),
+        check_box(`${imaged} shape beside it`, show.ghost, set("ghost")), check_box(supine.data.case.side === "none" ? "supports" : "chest muscle", show.muscle, set("muscle"))),
       group("Look from", el("div", { class: "row" }, [["front", "front"], ["outer", both ? "left side" : "outer side"], ["inner", both ? "right side" : "inner side"], ["feet", "feet"], ["head", "head"]]
         .map(([id, label]) => el("button", { type: "button", "data-view": id, onclick: () => this.view(id) }, label)))),
       el("p", { class: "hint" }, "Drag to turn, wheel to zoom. Keys in the picture: arrows, + −, 1 to 5, 0."),
@@ -166,7 +167,7 @@ class View {
 
   // What is shown, in words, and its legend.
   tell() {
-    const { state, pose, morph } = this, shape = morph === 0 ? "prone" : morph === 1 ? "undeformed" : morph === 2 ? pose : `on the way, ${morph < 1 ? "prone to undeformed" : "undeformed to " + pose}`;
+    const { state, pose, morph } = this, { imaged } = supine.data.case, shape = morph === 0 ? imaged : morph === 1 ? "undeformed" : morph === 2 ? pose : `on the way, ${morph < 1 ? imaged + " to undeformed" : "undeformed to " + pose}`;
     const comparison = model.comparison_of(state, pose);
     this.status.replaceChildren(`${words(state.label)}, ${shape}`, comparison ? `; distance to the scan in pose ${pose}: RMS ` : "",
       comparison ? shown(model.comparison_file(state, pose), ["rms_mm"]) : "", comparison ? " mm." : ".", this.colour === "distance" && comparison ? " Grey: not measured." : "");
@@ -181,7 +182,7 @@ class View {
     const spots = this.show.labels && this.colour === "distance" ? model.spots_of(this.state, this.pose).filter((s) => faces(s.point)) : [];
     const marks = this.show.landmarks ? model.landmarks_at(this.state, this.pose, this.morph) : [];
     const seen = marks.filter((m) => faces(nearest(this.points, m.predicted, (i) => model.region_of_point[i] === 2)));
-    const gravity = this.morph < 0.5 ? model.gravity_of("prone") : this.morph > 1.5 ? model.gravity_of(this.pose) : [0, 0, 0];
+    const gravity = this.morph < 0.5 ? model.gravity_of(supine.data.case.imaged) : this.morph > 1.5 ? model.gravity_of(this.pose) : [0, 0, 0];
     this.overlay.draw(width, height, spots.map((s) => ({ text: s.text, at: this.scene.project(row(this.points, s.point)) })),
       seen.map((m) => ({ name: m.name, predicted: this.scene.project(m.predicted), measured: m.measured && this.scene.project(m.measured) })),
       gravity.every((g) => g === 0) ? null : this.scene.flat(gravity));

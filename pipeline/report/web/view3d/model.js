@@ -113,11 +113,20 @@ export const colour_limit = (() => {
   return [1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 50].find((limit) => limit >= p95 * 0.95) || 50;
 })();
 
+// Of an object: up against gravity, seen from the side of its longest direction.
+function of_object(anatomy) {
+  const down = data.case.poses.map((p) => p.gravity).find((g) => g.some((x) => x !== 0)) || anatomy.across.map((x) => -x);
+  const head = down.map((x) => -x), along = anatomy.along;
+  const side = [along[1] * head[2] - along[2] * head[1], along[2] * head[0] - along[0] * head[2], along[0] * head[1] - along[1] * head[0]];
+  return side.some((x) => Math.abs(x) > 0.1) ? { outward: unit(side).map((x) => -x), lateral: along, head } : { outward: anatomy.outward, lateral: along, head: anatomy.across };
+}
+
 // Directions of the patient: {outward, lateral, head}.
 export const directions = (() => {
   const anatomy = data.figures["mesh.json"] && data.figures["mesh.json"].anatomy;
+  if (anatomy && anatomy.side === "none") return of_object(anatomy);
   if (anatomy && Array.isArray(anatomy.outward)) return anatomy;
-  const prone = data.case.poses.find((p) => p.name === "prone").gravity;
+  const prone = data.case.poses.find((p) => p.name === data.case.imaged).gravity;
   return { outward: unit(prone), lateral: [data.case.side === "right" ? -1 : 1, 0, 0], head: [0, 0, 1] };
 })();
 export const gravity_of = (name) => data.case.poses.find((p) => p.name === name).gravity;

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+// Made series of drawn torsos through the automatic recipes, against what they were made of.
+//   bench_mri_series t1|fatsat|t2 FIRST COUNT [FOLDER]     a row per seed, then medians; with FOLDER the overlays of
+//   the worst bench_mri_series planted SEED                          planted failures and what is said
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include "common/error.h"
+#include "phantom/mri/series.h"
+#include "segmentation/label_map.h"
+#include "segmentation/overlay.h"
+#include "segmentation/steps/recipe_toml.h"
+#include "segmentation/steps/run_recipe.h"
+
+using namespace supine;
+using segmentation::Mask;
+
+namespace {
+
+struct Score {
+  double breast = 0, gland = 0, breast_hd95 = 0, gland_hd95 = 0, breast_ml = 0, true_breast_ml = 0, gland_ml = 0,
+         true_gland_ml = 0, share_ml = 0, wall_median = 0, wall_95 = 0;
+  std::size_t doubts = 0;
+};
+
+double dice(const Mask& a, const Mask& b) {
+  std::size_t both = 0, sum = 0;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    both += a[n] && b[n];
+    sum += a[n] + b[n];
+  }
+  return sum > 0 ? 2.0 * static_cast<double>(both) / static_cast<double>(sum) : 1;
+}
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+/// 95 % of the distances from the border voxels of either mask to the other mask's.
+double hausdorff95(const Mask& a, const Mask& b, const segmentation::Grid& grid) {
+  const auto border = [&grid](const Mask& mask) {
+    Mask rim = segmentation::erode(mask, grid, grid.spacing_mm.maxCoeff() * 1.01);
+    for (std::size_t n = 0; n < rim.size(); ++n) rim[n] = mask[n] && !rim[n];
+    return rim;
+  };
+  const Mask rim_a = border(a), rim_b = border(b);
+  const auto to_a = segmentation::squared_distance_mm2(rim_a, grid),
+             to_b = segmentation::squared_distance_mm2(rim_b, grid);
+  std::vector<double> distances;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    if (rim_a[n] && std::isfinite(to_b[n])) distances.push_back(std::sqrt(to_b[n]));
+    if (rim_b[n] && std::isfinite(to_a[n])) distances.push_back(std::sqrt(to_a[n]));
+  }
+  return percentile(std::move(distances), 0.95);
+}
+
+double ml(const Mask& mask, const segmentation::Grid& grid) {
+  return static_cast<double>(std::count(mask.begin(), mask.end(), 1)) * grid.voxel_volume_mm3() / 1000;
+}
+
+/// Between the levels of the breasts and in front of a reader's end: there truth and result mean the same.
+Score score(const phantom::Torso& torso, const phantom::MadeSeries& made, const segmentation::RecipeResult& result) {
+  const segmentation::Grid& grid = made.image.grid;
+  const std::size_t count = grid.count();
+  Mask breast(count), gland(count), true_breast(count), true_gland(count);
+  Score s;
+  for (int k = 0; k < grid.size.z(); ++k)
+    for (int j = 0; j < grid.size.y(); ++j)
+      for (int i = 0; i < grid.size.x(); ++i) {
+        const std::size_t n = grid.index(i, j, k);
+        const Eigen::Vector3d p = grid.point(Eigen::Vector3d(i, j, k));
+        if (p.z() < torso.low_z_mm() || p.z() > torso.high_z_mm() || p.y() > torso.back_y_mm() - 10) continue;
+        const auto stuff = static_cast<phantom::Stuff>(made.truth.voxels[n]);
+        true_gland[n] = stuff == phantom::Stuff::gland;
+        true_breast[n] = true_gland[n] || stuff == phantom::Stuff::fat || stuff == phantom::Stuff::skin ||
+                         stuff == phantom::Stuff::vessel;
+        const auto tissue = static_cast<segmentation::Tissue>(result.labels.voxels[n]);
+        gland[n] = tissue == segmentation::Tissue::gland;
+        breast[n] = segmentation::is_meshed(tissue);
+        if (!result.fraction_gland.empty()) s.share_ml += result.fraction_gland[n] * grid.voxel_volume_mm3() / 1000;
+      }
+  s.breast = dice(breast, true_breast);
+  s.gland = dice(gland, true_gland);
+  s.breast_hd95 = hausdorff95(breast, true_breast, grid);
+  s.gland_hd95 = hausdorff95(gland, true_gland, grid);
+  s.breast_ml = ml(breast, grid);
+  s.true_breast_ml = ml(true_breast, grid);
+  s.gland_ml = ml(gland, grid);
+  s.true_gland_ml = ml(true_gland, grid);
+  s.doubts = result.doubts.size();
+  std::vector<double> off;
+  const segmentation::ChestWall& wall = result.walls.back();
+  for (Eigen::Index k = 0; k < wall.radius_mm.cols(); ++k)
+    for (Eigen::Index a = 0; a < wall.radius_mm.rows(); ++a) {
+      const Eigen::Vector3d p = wall.point(a, k);
+      if (p.z() < torso.low_z_mm() || p.z() > torso.high_z_mm() || std::abs(p.x()) > 110) continue;
+      off.push_back(std::abs(p.y() - torso.chest_y_mm(p.x(), p.z())));
+    }
+  s.wall_median = percentile(off, 0.5);
+  s.wall_95 = percentile(off, 0.95);
+  return s;
+}
+
+segmentation::RecipeResult segment(const segmentation::GreyImage& image, bool fat_bright) {
+  return segmentation::run_recipe(image, segmentation::read_shipped_recipe(fat_bright ? "t1_auto" : "fatsat_auto"));
+}
+
+void draw(const phantom::MadeSeries& made, const segmentation::LabelImage& labels, const std::string& file) {
+  std::vector<double> places;
+  segmentation::write_png(segmentation::overlay(labels, &made.image, 2, {}, places), file);
+}
+
+int table(phantom::Series series, std::uint64_t first, int count, const std::string& folder) {
+  std::vector<double> breast, gland, volume, wall, wall95, breast95, gland95;
+  fmt::print(
+      "| seed | breast Dice | HD95 mm | ml (true) | gland Dice | HD95 mm | ml (true), by share | wall median / 95 % mm "
+      "| doubts |\n"
+      "|---|---|---|---|---|---|---|---|---|\n");
+  int failed = 0;
+  for (std::uint64_t seed = first; seed < first + static_cast<std::uint64_t>(count); ++seed) {
+    const phantom::Torso torso(seed);
+    const phantom::MadeSeries made = phantom::make_series(torso, seed, {.series = series});
+    try {
+      const auto result = segment(made.image, series == phantom::Series::t1);
+      const Score s = score(torso, made, result);
+      fmt::print(
+          "| {} | {:.3f} | {:.1f} | {:.0f} ({:.0f}) | {:.3f} | {:.1f} | {:.0f} ({:.0f}), {:.0f} | {:.1f} / {:.1f} | {} "
+          "|\n",
+          seed, s.breast, s.breast_hd95, s.breast_ml, s.true_breast_ml, s.gland, s.gland_hd95, s.gland_ml,
+          s.true_gland_ml, s.share_ml, s.wall_median, s.wall_95, s.doubts);
+      breast.push_back(s.breast);
+      gland.push_back(s.gland);
+      breast95.push_back(s.breast_hd95);
+      gland95.push_back(s.gland_hd95);
+      wall.push_back(s.wall_median);
+      wall95.push_back(s.wall_95);
+      if (s.true_gland_ml > 0) volume.push_back(s.gland_ml / s.true_gland_ml);
+      if (!folder.empty() && (s.breast < 0.9 || s.gland < 0.6))
+        draw(made, result.labels, fmt::format("{}/{}.png", folder, seed));
+    } catch (const InputError& error) {
+      ++failed;
+      fmt::print("| {} | refused: {} |\n", seed, error.what());
+      if (!folder.empty())
+        draw(made, {made.truth.grid, std::vector<std::uint8_t>(made.truth.voxels.size(), 0)},
+             fmt::format("{}/{}_refused.png", folder, seed));
+    }
+    std::fflush(stdout);
+  }
+  fmt::print("| median | {:.3f} | {:.1f} | | {:.3f} | {:.1f} | × {:.2f} | {:.1f} / {:.1f} | |\n",
+             percentile(breast, 0.5), percentile(breast95, 0.5), percentile(gland, 0.5), percentile(gland95, 0.5),
+             percentile(volume, 0.5), percentile(wall, 0.5), percentile(wall95, 0.5));
+  fmt::print("| worst tenth | {:.3f} | {:.1f} | | {:.3f} | {:.1f} | × {:.2f} | {:.1f} / {:.1f} | {} refused |\n",
+             percentile(breast, 0.1), percentile(breast95, 0.9), percentile(gland, 0.1), percentile(gland95, 0.9),
+             percentile(volume, 0.1), percentile(wall, 0.9), percentile(wall95, 0.9), failed);
+  return 0;
+}
+
+void plant(const char* what, const segmentation::GreyImage& image, bool fat_bright) {
+  try {
+    const auto result = segment(image, fat_bright);
+    std::string said;
+    for (const auto& doubt : result.doubts) said += fmt::format("{}{}", said.empty() ? "" : "; ", doubt.what);
+    fmt::print("| {} | {} | {} |\n", what, result.doubts.empty() ? 0 : 1, said.empty() ? "nothing" : said);
+  } catch (const InputError& error) {
+    fmt::print("| {} | 2 | {} |\n", what, error.what());
+  }
+  std::fflush(stdout);
+}
+
+/// The half of an image on one side of x = 0, less an edge.
+segmentation::GreyImage half_of(const segmentation::GreyImage& image, double from_x_mm, double to_x_mm) {
+  segmentation::GreyImage part{image.grid, {}};
+  const int low = std::max(0, static_cast<int>(image.grid.continuous_index({from_x_mm, 0, 0}).x())),
+            high =
+                std::min(image.grid.size.x() - 1, static_cast<int>(image.grid.continuous_index({to_x_mm, 0, 0}).x()));
+  part.grid.size.x() = high - low + 1;
+  part.grid.origin_mm = image.grid.point(Eigen::Vector3d(low, 0, 0));
+  for (int k = 0; k < image.grid.size.z(); ++k)
+    for (int j = 0; j < image.grid.size.y(); ++j)
+      for (int i = low; i <= high; ++i) part.voxels.push_back(image.at(i, j, k));
+  return part;
+}
+
+int planted(std::uint64_t seed) {
+  using phantom::Series;
+  const phantom::Torso torso(seed);
+  const auto image = [&](const phantom::SeriesOptions& options) {
+    return phantom::make_series(torso, seed, options).image;
+  };
+  fmt::print("| planted | exit | said |\n|---|---|---|\n");
+  const segmentation::GreyImage t1 = image({}), fatsat = image({.series = Series::fatsat});
+  plant("none, T1", t1, true);
+  plant("none, fat-suppressed", fatsat, false);
+  plant("fat-suppressed for T1", fatsat, true);
+  plant("T1 for fat-suppressed", t1, false);
+  const segmentation::GreyImage t2 = image({.series = Series::t2});
+  plant("T2 for T1", t2, true);
+  plant("T2 for fat-suppressed T1", t2, false);
+  plant("no suppression at all", image({.series = Series::fatsat, .all_fails = true}), false);
+  plant("inverted contrast", image({.inverted = true}), true);
+  plant("upside down", image({.upside_down = true}), true);
+  const double cut = torso.nipple_mm(1).x();
+  plant("half a breast (the image ends in it)", half_of(t1, -300, cut), true);
+  plant("one breast in the image", half_of(t1, 5, 300), true);
+  phantom::Torso lone(seed);
+  lone.remove(0);
+  plant("one breast absent", phantom::make_series(lone, seed, {}).image, true);
+  segmentation::GreyImage table = t1;
+  for (int k = 0; k < t1.grid.size.z(); ++k)
+    for (int j = 0; j < t1.grid.size.y(); ++j)
+      for (int i = 0; i < t1.grid.size.x(); ++i) {
+        const Eigen::Vector3d p = t1.grid.point(Eigen::Vector3d(i, j, k));
+        if (std::abs(p.y() - torso.nipple_mm(0).y() + 4) < 6 && std::abs(p.x()) < 150) table.at(i, j, k) += 400;
+      }
+  plant("table in the body (a bright plate at the nipples)", table, true);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc >= 3 && std::strcmp(argv[1], "planted") == 0) return planted(std::strtoull(argv[2], nullptr, 10));
+  if (argc < 4) {
+    fmt::print(stderr, "bench_mri_series t1|fatsat|t2 FIRST COUNT [FOLDER], or planted SEED\n");
+    return 2;
+  }
+  const std::string kind = argv[1];
+  return table(kind == "t1"   ? phantom::Series::t1
+               : kind == "t2" ? phantom::Series::t2
+                              : phantom::Series::fatsat,
+               std::strtoull(argv[2], nullptr, 10), std::atoi(argv[3]), argc > 4 ? argv[4] : "");
+}

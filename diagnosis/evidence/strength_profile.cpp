@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/evidence/strength_profile.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "common/error.h"
+#include "simulation/parameters.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::FreeParameters;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double stride = 1.5;    // standard deviations between two places
+constexpr double fallen = 4;      // of ln, from the highest: no further place
+constexpr int most_per_side = 4;  // places
+constexpr double bent = 0.5;      // of what the usual size changes, that the slope does not say
+
+struct Place {
+  double u, ln_density;
+  VectorXd others;  ///< coordinates of the other free parameters, where they are likeliest
+};
+
+double ln_normal(double u, const calibration::Prior& prior) {
+  const double z = (u - prior.mean) / prior.sd;
+  return -0.5 * z * z - std::log(prior.sd * std::sqrt(2 * std::numbers::pi));
+}
+
+/// The likeliest offsets of the first @p count numbers.
+VectorXd likeliest(const Weighed& weighed, Index count) {
+  Index size;
+  weighed.size_probability.maxCoeff(&size);
+  return weighed.mean[static_cast<std::size_t>(size)].head(count);
+}
+
+class Walker {
+ public:
+  Walker(const RefitGround& ground, const Refit& refit, const FreeParameters& parameters, Index k)
+      : ground_(ground), refit_(refit), parameters_(parameters), k_(k), prior_(*parameters.priors()[index()]) {}
+
+  /// Where the refit stands: its slopes are known.
+  Place start() const {
+    const Hypothesis& h = refit_.hypothesis;
+    std::vector<int> rows = h.rows;
+    rows.erase(rows.begin() + k_);
+    const Weighed weighed = h.evidence->weigh(rows);
+    const double u = refit_.fit.u[k_];
+    const VectorXd others = without(refit_.fit.u);
+    return {u, weighed.ln_evidence + ln_normal(u, prior_), others + likeliest(weighed, others.size())};
+  }
+
+  /// Places to one side.
+  std::vector<Place> walk(const Place& from, double step) const {
+    std::vector<Place> places;
+    Place before = from, last = from;
+    double most = from.ln_density;
+    simulation::ChainSolution near = refit_.fit.prediction.solution;
+    for (int count = 0; count < most_per_side && last.ln_density > most - fallen; ++count) {
+      const double u = std::clamp(last.u + step, parameters_.lower()[k_], parameters_.upper()[k_]);
+      if (std::abs(u - last.u) < 0.1 * std::abs(step)) break;  // the end of the range
+      try {
+        const VectorXd others = count == 0 ? last.others : VectorXd(2 * last.others - before.others);
+        const Place next = place(u, others, near);
+        before = last, last = next;
+      } catch (const NumericalFailure&) {
+        break;  // a body that cannot be
+      }
+      most = std::max(most, last.ln_density);
+      places.push_back(last);
+    }
+    return places;
+  }
+
+ private:
+  std::size_t index() const { return static_cast<std::size_t>(k_); }
+
+  VectorXd without(const VectorXd& u) const {
+    VectorXd others(u.size() - 1);
+    others << u.head(k_), u.tail(u.size() - k_ - 1);
+    return others;
+  }
+
+  /// @param near  in: a solution to start from; out: the one here
+  Place place(double u, const VectorXd& others, simulation::ChainSolution& near) const {
+    simulation::Model model = parameters_.base();
+    simulation::Setting& setting = *simulation::find_setting(model, parameters_.names()[index()]);
+    setting.value = parameters_.value(k_, u);
+    setting.free = false;
+    const FreeParameters rest(model);
+    calibration::Evaluator evaluator(ground_.scene, rest.base(), accurate_enough());
+    WeightedFit fit = weigh(evaluator, rest, ground_.metric, rest.clamped(others), &near);
+    descend(evaluator, rest, ground_.metric, {.max_iterations = 2, .settled = 0.5}, fit);
+    near = fit.solution.prediction.solution;
+    const LinearEvidence evidence(*ground_.base.covariance, ground_.base.distances(fit.solution.residuals),
+                                  directions_at(fit.solution, rest, ground_.nuisances, ground_.base.clusters));
+    std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
+    std::iota(all.begin(), all.end(), 0);
+    const Weighed weighed = evidence.weigh(all);
+    return {u, weighed.ln_evidence + ln_normal(u, prior_), fit.solution.u + likeliest(weighed, others.size())};
+  }
+
+  const RefitGround& ground_;
+  const Refit& refit_;
+  const FreeParameters& parameters_;
+  Index k_;
+  calibration::Prior prior_;
+};
+
+}  // namespace
+
+bool is_far_from_linear(const Candidate& candidate) {
+  if (candidate.secant.size() == 0) return false;
+  const VectorXd promised = candidate.parameters[0].typical * candidate.slope.col(0);
+  return (promised - candidate.secant).norm() > bent * candidate.secant.norm();
+}
+
+std::optional<CurvedDensity> strength_profile(const RefitGround& ground, const Refit& refit,
+                                              const FreeParameters& parameters, Index k) {
+  const double sd = refit.hypothesis.weighed.number(k).second;
+  const Walker walker(ground, refit, parameters, k);
+  const Place middle = walker.start();
+  std::array<std::vector<Place>, 2> sides;
+#pragma omp parallel for schedule(static, 1)
+  for (std::size_t side = 0; side < 2; ++side) sides[side] = walker.walk(middle, (side == 0 ? -stride : stride) * sd);
+  std::vector<double> at, ln;
+  const auto add = [&](const Place& place) { at.push_back(place.u), ln.push_back(place.ln_density); };
+  std::for_each(sides[0].rbegin(), sides[0].rend(), add);
+  add(middle);
+  std::for_each(sides[1].begin(), sides[1].end(), add);
+  if (at.size() < 4) return std::nullopt;
+  return CurvedDensity(std::move(at), std::move(ln), parameters.lower()[k], parameters.upper()[k]);
+}
+
+}  // namespace supine::diagnosis

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <optional>
+
+#include "diagnosis/candidates.h"
+#include "diagnosis/evidence/curved_density.h"
+#include "diagnosis/evidence/set_refit.h"
+#include "diagnosis/weighted_fit.h"
+
+namespace supine::diagnosis {
+
+/// Whether the distances follow the effect's usual size in another way than its slope at the null says.
+/// @return  false where that size was not solved
+bool is_far_from_linear(const Candidate& candidate);
+
+/// What a refit stood on.
+struct RefitGround {
+  const calibration::MeasuredScene& scene;
+  const BaseFit& base;
+  const Metric& metric;
+  const std::vector<Nuisance>& nuisances;
+};
+
+/// Posterior density of one strength, in its coordinate, evidence included: the strength is held at places 1.5 standard
+/// deviations apart until the density has fallen to a fiftieth, everything else is fitted there through the chain and
+/// integrated by Laplace's formula (Tierney and Kadane 1986, marginal
+/// densities).
+/// Its mass stands in place of the evidence that Laplace's formula gives at the optimum alone.
+/// @param parameters  the refit's, nuisances at their values in their base
+/// @param k           one of their coordinates, which has a prior
+/// @return            nothing where fewer than four places have an equilibrium
+std::optional<CurvedDensity> strength_profile(const RefitGround& ground, const Refit& refit,
+                                              const calibration::FreeParameters& parameters, Eigen::Index k);
+
+}  // namespace supine::diagnosis

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/targets/moves.h"
+
+#include "diagnosis/evidence/patchiness.h"
+#include "simulation/parameters.h"
+
+namespace supine::diagnosis {
+namespace {
+
+/// 3 rows per point.
+Eigen::VectorXd flat(const Points& points) { return Eigen::Map<const Eigen::VectorXd>(points.data(), points.size()); }
+
+Eigen::MatrixXd patches_of(const PoseAt& at, const simulation::Embedding& points, const Patchiness& patchiness) {
+  const auto directions = patchy_directions(at.chain, patchiness);
+  Eigen::MatrixXd all(3 * points.outside_mm().size(), static_cast<Eigen::Index>(directions.size()));
+  for (std::size_t k = 0; k < directions.size(); ++k)
+    all.col(static_cast<Eigen::Index>(k)) = flat(points.at(at.sensitivities.along(directions[k]).poses[0]));
+  return all;
+}
+
+}  // namespace
+
+PointMoves moves_of(const PoseAt& at, const simulation::Embedding& points, const calibration::FreeParameters& free,
+                    const Eigen::VectorXd& u, const std::vector<Nuisance>& nuisances, const Patchiness& patchiness,
+                    const std::vector<Eigen::VectorXd>& forces) {
+  const auto moved = [&](const std::string& name) { return flat(points.at(at.sensitivities.of(name).poses[0])); };
+  const Eigen::Index rows = 3 * points.outside_mm().size();
+  const std::string& pose = at.chain.poses()[1].name;
+  PointMoves moves{Eigen::MatrixXd(rows, u.size()),
+                   Eigen::MatrixXd::Zero(rows, static_cast<Eigen::Index>(nuisances.size())),
+                   patches_of(at, points, patchiness), Eigen::MatrixXd(rows, static_cast<Eigen::Index>(forces.size()))};
+  const Eigen::VectorXd unit = free.slope(u);
+  for (Eigen::Index i = 0; i < u.size(); ++i)
+    moves.parameters.col(i) = unit[i] * moved(free.names()[static_cast<std::size_t>(i)]);
+  for (std::size_t k = 0; k < nuisances.size(); ++k) {
+    const Nuisance& nuisance = nuisances[k];
+    if (!nuisance.pose.empty() && nuisance.pose != pose) continue;
+    const bool base = nuisance.effect.empty();
+    const std::string name = base ? nuisance.parameter : nuisance.effect + "." + nuisance.parameter;
+    const double scale = nuisance.sigma * (base ? simulation::base_setting(at.model, name).value : 1);
+    moves.nuisances.col(static_cast<Eigen::Index>(k)) = scale * moved(name);
+  }
+  for (std::size_t f = 0; f < forces.size(); ++f)
+    moves.forces.col(static_cast<Eigen::Index>(f)) = flat(points.at(at.sensitivities.moved_by(0, forces[f])));
+  return moves;
+}
+
+}  // namespace supine::diagnosis

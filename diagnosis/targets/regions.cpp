@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/targets/regions.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "calibration/model_skin.h"
+#include "common/statistics.h"
+#include "diagnosis/evidence/discrepancy.h"
+#include "diagnosis/evidence/field_modes.h"
+#include "diagnosis/targets/moves.h"
+#include "diagnosis/weighted_fit.h"
+#include "simulation/parameters.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::FreeParameters;
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+// Of a mesh whose error was not measured in the pose: 4.5 % of the way in the median of sixteen computed breasts
+// (docs/diagnosis.md), spread over three axes.
+const double mesh_share_of_way = 0.045 / std::sqrt(3.0);
+constexpr double marker_mm = 1.5;  // of a marker's place, each axis; as of landmarks that state no sigma_mm
+constexpr std::size_t most_told = 6;
+constexpr double open_sd = 3;  // coordinates of a parameter without prior, as in directions_at()
+
+/// One solved chain of the imaged pose and the one asked for.
+struct Solved {
+  Solved(const TargetQuestion& question, const simulation::Model& model_, const simulation::ChainSolution* near)
+      : model(model_),
+        chain(*question.mesh, *question.anatomy, model, {question.prone, question.pose}, accurate_enough()),
+        solution(chain.solve(model, near)),
+        sensitivities(chain, model, solution) {}
+  simulation::Model model;
+  simulation::Chain chain;
+  simulation::ChainSolution solution;
+  simulation::Sensitivities sensitivities;
+  const Points& x() const { return solution.poses[0].x; }
+};
+
+/// The points asked for, then of each the skin that is nearest, then the skin over it against gravity (or the nearest).
+struct Places {
+  Points imaged, there;  // 3 #P rows
+  std::vector<Vector3d> normal, straight_normal;
+  std::vector<bool> has_straight;
+};
+
+/// Where the line from @p from along @p way leaves the skin last.
+std::optional<std::pair<Index, Vector3d>> last_crossing(const calibration::SurfaceDistance& skin, const Vector3d& from,
+                                                        const Vector3d& way) {
+  std::optional<std::pair<Index, Vector3d>> found;
+  double furthest = 0;
+  for (Index t = 0; t < skin.triangles().rows(); ++t) {
+    const Vector3d a = skin.points().row(skin.triangles()(t, 0)), b = skin.points().row(skin.triangles()(t, 1)),
+                   c = skin.points().row(skin.triangles()(t, 2));
+    Matrix3d system;
+    system << b - a, c - a, -way;
+    const Vector3d s = system.fullPivLu().solve(from - a);
+    if (!s.allFinite() || s[0] < -1e-9 || s[1] < -1e-9 || s[0] + s[1] > 1 + 1e-9 || s[2] <= furthest) continue;
+    furthest = s[2];
+    found = {t, Vector3d(1 - s[0] - s[1], s[0], s[1])};
+  }
+  return found;
+}
+
+Places places_of(const TargetQuestion& question, const Points& x) {
+  const Index count = question.imaged.rows();
+  const calibration::ModelSkin skin(*question.mesh, x);
+  const auto& surface = skin.distance();
+  Places places{Points(3 * count, 3), Points(3 * count, 3), {}, {}, {}};
+  const Points there = simulation::Embedding(*question.mesh, question.imaged).at(x);
+  calibration::ClosestPoints closest;
+  surface.closest(there, closest);
+  for (Index p = 0; p < count; ++p) {
+    const auto set = [&](Index row, const auto& nodes, const Vector3d& weight) {
+      places.imaged.row(row).setZero(), places.there.row(row).setZero();
+      for (int a = 0; a < 3; ++a) {
+        places.imaged.row(row) += weight[a] * question.mesh->points.row(nodes[a]);
+        places.there.row(row) += weight[a] * x.row(nodes[a]);
+      }
+    };
+    places.imaged.row(p) = question.imaged.row(p), places.there.row(p) = there.row(p);
+    set(count + p, closest.node.row(p), closest.weight.row(p).transpose());
+    places.normal.push_back(closest.normal.row(p).transpose());
+    const auto over = last_crossing(surface, there.row(p).transpose(), -question.pose.gravity);
+    places.has_straight.push_back(over.has_value());
+    if (!over) {
+      set(2 * count + p, closest.node.row(p), closest.weight.row(p).transpose());
+      places.straight_normal.push_back(places.normal.back());
+      continue;
+    }
+    const auto nodes = surface.triangles().row(over->first);
+    set(2 * count + p, nodes, over->second);
+    const Vector3d a = x.row(nodes[0]), b = x.row(nodes[1]), c = x.row(nodes[2]);
+    places.straight_normal.push_back((b - a).cross(c - a).normalized());
+  }
+  return places;
+}
+
+/// Nuisances of the pose that no measured pose has.
+std::vector<Nuisance> with_those_of(const simulation::Model& model, std::vector<Nuisance> known,
+                                    const std::string& pose, const Priors& priors) {
+  for (const Nuisance& nuisance : known)
+    if (nuisance.pose == pose) return known;
+  for (Nuisance& nuisance : nuisances_of(model, {pose}, priors))
+    if (nuisance.pose == pose) known.push_back(std::move(nuisance));
+  return known;
+}
+
+MatrixXd beyond_forces(const Points& places) {
+  const MatrixXd plain = gaussian_kernel(places, places, beyond_forces_length_mm);
+  MatrixXd all = MatrixXd::Zero(3 * places.rows(), 3 * places.rows());
+  for (Index i = 0; i < plain.rows(); ++i)
+    for (Index j = 0; j < plain.cols(); ++j)
+      for (int a = 0; a < 3; ++a) all(3 * i + a, 3 * j + a) = share_beyond_forces * plain(i, j);
+  return all;
+}
+
+/// Errors of the mesh: alike for places close to each other.
+MatrixXd mesh_errors(const Points& places, double sd_mm, double length_mm) {
+  MatrixXd all = MatrixXd::Zero(3 * places.rows(), 3 * places.rows());
+  for (Index i = 0; i < places.rows(); ++i)
+    for (Index j = 0; j < places.rows(); ++j)
+      for (int a = 0; a < 3; ++a)
+        all(3 * i + a, 3 * j + a) = sd_mm * sd_mm * std::exp(-(places.row(i) - places.row(j)).norm() / length_mm);
+  return all;
+}
+
+void fill_targets(JointMoves& joint, const PointMoves& moves, const Points& places) {
+  joint.targets.resize(moves.parameters.rows(), moves.parameters.cols() + moves.nuisances.cols());
+  joint.targets << moves.parameters, moves.nuisances;
+  joint.target_patches = moves.patches;
+  joint.target_kernel = moves.forces * moves.forces.transpose() + beyond_forces(places);
+}
+
+Depth depth_of(const Vector3d& target, const Vector3d& skin, const Vector3d& normal, const Vector3d& way,
+               const Eigen::Matrix<double, 6, 6>& covariance) {
+  // Both move: the length along the way changes by n·(skin − target) / n·way.
+  Eigen::Matrix<double, 6, 1> slope;
+  slope << -normal, normal;
+  slope /= normal.dot(way);
+  return {skin, (skin - target).dot(way), std::sqrt(std::max(0.0, slope.dot(covariance * slope)))};
+}
+
+/// Share of the variances of a target that goes with what is known of something else.
+double gone(const MatrixXd& cross, const MatrixXd& other, const Matrix3d& own) {
+  return (cross * other.ldlt().solve(cross.transpose())).trace() / own.trace();
+}
+
+std::vector<Shrink> shrinks_of(const ConditionedTargets& known, const std::vector<std::string>& names, Index row,
+                               Index skin_row) {
+  const Matrix3d own = known.covariance.block<3, 3>(row, row);
+  std::vector<Shrink> all;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const auto column = static_cast<Index>(k);
+    if (known.direction_variance[column] <= 0) continue;
+    const Vector3d cross = known.with_directions.col(column).segment<3>(row);
+    all.push_back({names[k], cross.squaredNorm() / known.direction_variance[column] / own.trace()});
+  }
+  const Matrix3d marker =
+      known.covariance.block<3, 3>(skin_row, skin_row) + marker_mm * marker_mm * Matrix3d::Identity();
+  all.push_back({"marker on the nearest skin", gone(known.covariance.block<3, 3>(row, skin_row), marker, own)});
+  std::stable_sort(all.begin(), all.end(), [](const Shrink& a, const Shrink& b) { return a.share > b.share; });
+  all.resize(std::min(all.size(), most_told));
+  return all;
+}
+
+/// Six rows of two points.
+Eigen::Matrix<double, 6, 6> of_two(const MatrixXd& covariance, Index a, Index b) {
+  Eigen::Matrix<double, 6, 6> both;
+  both << covariance.block<3, 3>(a, a), covariance.block<3, 3>(a, b), covariance.block<3, 3>(b, a),
+      covariance.block<3, 3>(b, b);
+  return both;
+}
+
+TargetRegions told(const TargetQuestion& question, const Places& places, const ConditionedTargets& known,
+                   const std::vector<std::string>& names) {
+  const Index count = question.imaged.rows();
+  const Eigen::VectorXd outside = simulation::Embedding(*question.mesh, question.imaged).outside_mm();
+  const Points moved = places.there + Eigen::Map<const Points>(known.mean.data(), 3 * count, 3);
+  const double reach = std::sqrt(chi_squared_quantile(3, 0.95));
+  TargetRegions regions;
+  regions.covariance = known.covariance.topLeftCorner(3 * count, 3 * count);
+  for (Index p = 0; p < count; ++p) {
+    TargetRegion region;
+    region.name = question.names[static_cast<std::size_t>(p)];
+    region.model_mm = places.there.row(p), region.place_mm = moved.row(p), region.outside_mm = outside[p];
+    region.covariance = known.covariance.block<3, 3>(3 * p, 3 * p);
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(region.covariance);
+    region.half_axes_mm = reach * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
+    region.axes = eigen.eigenvectors().rowwise().reverse();
+    const Index near = count + p, over = 2 * count + p;
+    const auto k = static_cast<std::size_t>(p);
+    region.nearest = depth_of(region.place_mm, moved.row(near), places.normal[k], places.normal[k],
+                              of_two(known.covariance, 3 * p, 3 * near));
+    if (places.has_straight[k] && places.straight_normal[k].dot(question.pose.gravity) < -0.1)
+      region.straight = depth_of(region.place_mm, moved.row(over), places.straight_normal[k], -question.pose.gravity,
+                                 of_two(known.covariance, 3 * p, 3 * over));
+    region.shrinks = shrinks_of(known, names, 3 * p, 3 * near);
+    regions.points.push_back(std::move(region));
+  }
+  return regions;
+}
+
+double way_of(const Solved& solved) {
+  const Points way = solved.x() - solved.solution.prone;
+  return std::sqrt(way.squaredNorm() / static_cast<double>(way.rows()));
+}
+
+/// Rows of the clusters that are landmarks of one pose.
+std::vector<int> landmark_rows(const calibration::Clusters& clusters, int pose) {
+  std::vector<int> rows;
+  for (Index i = 0; i < clusters.kind.size(); ++i)
+    if (clusters.kind[i] > 0 && clusters.pose[i] == pose) rows.push_back(static_cast<int>(i));
+  return rows;
+}
+
+int row_of_pose(const calibration::MeasuredScene& scene, const std::string& pose) {
+  for (std::size_t m = 0; m < scene.measurements.size(); ++m)
+    if (scene.measurements[m]->pose.name == pose) return static_cast<int>(m);
+  return -1;
+}
+
+/// What was measured, as the base fit has it.
+JointMoves measured_part(calibration::Evaluator& evaluator, const BaseFit& base, const Priors& priors,
+                         const std::vector<Nuisance>& nuisances, Discrepancy& discrepancy) {
+  const simulation::Sensitivities at_data(evaluator.chain(), base.model, base.fit.prediction.solution);
+  const calibration::Residuals& residuals = base.fit.residuals;
+  discrepancy = discrepancy_of(*evaluator.scene().mesh, at_data, base.fit.prediction, residuals, base.clusters);
+  const Directions all = directions_at(base.fit, *base.parameters, base.nuisances, base.clusters);
+  const auto z = base.fit.u.size() + static_cast<Index>(nuisances.size()), n = all.columns.rows();
+  JointMoves joint;
+  // Those of the pose alone move no measured distance.
+  joint.data = MatrixXd::Zero(n, z), joint.mean = VectorXd::Zero(z), joint.sd = VectorXd::Ones(z);
+  joint.data.leftCols(all.size()) = all.columns;
+  joint.mean.head(all.size()) = all.mean, joint.sd.head(all.size()) = all.sd;
+  joint.y = base.distances(residuals);
+  joint.data_errors = base.errors, joint.data_kernel = base.kernel;
+  joint.data_patches = base.clusters.means(
+      patchiness_shapes(evaluator.chain(), at_data, base.fit.prediction, residuals, priors.patchiness));
+  const LinearEvidence evidence(*base.covariance, joint.y, all);
+  std::vector<int> every(static_cast<std::size_t>(all.size()));
+  std::iota(every.begin(), every.end(), 0);
+  joint.sizes_mm = base.covariance->sizes_mm(), joint.size_probability = evidence.weigh(every).size_probability;
+  return joint;
+}
+
+std::vector<std::string> names_of(const FreeParameters& free, const std::vector<Nuisance>& nuisances) {
+  std::vector<std::string> names = free.names();
+  for (const Nuisance& nuisance : nuisances) names.push_back(nuisance.name());
+  return names;
+}
+
+}  // namespace
+
+double TargetRegion::sd_mm() const { return std::sqrt(covariance.trace() / 3); }
+
+TargetRegions find_regions(const TargetQuestion& question, calibration::Evaluator& evaluator, const BaseFit& base,
+                           const Priors& priors) {
+  const auto nuisances = with_those_of(base.model, base.nuisances, question.pose.name, priors);
+  Discrepancy discrepancy;
+  JointMoves joint = measured_part(evaluator, base, priors, nuisances, discrepancy);
+  Solved solved(question, base.model, nullptr);
+  const Places places = places_of(question, solved.x());
+  const simulation::Embedding points(*question.mesh, places.imaged);
+  const PointMoves moves = moves_of({solved.chain, solved.sensitivities, solved.model}, points, *base.parameters,
+                                    base.fit.u, nuisances, priors.patchiness, discrepancy.forces);
+  fill_targets(joint, moves, places.there);
+  const int row = row_of_pose(evaluator.scene(), question.pose.name);
+  MatrixXd columns = discrepancy.columns;
+  for (Index i = 0; i < columns.rows(); ++i)
+    if (base.clusters.pose[i] != row) columns.row(i) *= common_to_poses;
+  joint.cross_kernel = moves.forces * columns.transpose();
+  const double mesh = base.numerical ? base.numerical->spread_mm : mesh_share_of_way * way_of(solved);
+  const double length = base.numerical ? std::max(5.0, base.numerical->length_mm) : beyond_forces_length_mm;
+  joint.target_errors = mesh_errors(places.there, mesh, length);
+  TargetRegions regions = told(question, places, condition(joint), names_of(*base.parameters, nuisances));
+  regions.measured = true, regions.unexplained_mm = base.size_mm;
+  const auto rows = landmark_rows(base.clusters, row);
+  if (!rows.empty()) {
+    regions.surprise = surprise_of(joint, rows);
+    regions.landmarks = evaluator.scene().landmarks[static_cast<std::size_t>(row)]->names;
+  }
+  return regions;
+}
+
+TargetRegions find_regions(const TargetQuestion& question, const simulation::Model& model, const Priors& priors) {
+  const FreeParameters free(model);
+  const VectorXd u = free.start();
+  const auto nuisances = nuisances_of(model, {question.prone.name, question.pose.name}, priors);
+  Solved solved(question, model, nullptr);
+  const Places places = places_of(question, solved.x());
+  const simulation::Embedding points(*question.mesh, places.imaged);
+  const auto forces = discrepancy_forces(*question.mesh, solved.solution.X);
+  const PoseAt at{solved.chain, solved.sensitivities, solved.model};
+  PointMoves moves = moves_of(at, points, free, u, nuisances, priors.patchiness, forces);
+  // A mean square of 1 mm² along the normal of the skin, as over the clusters of a scan.
+  const calibration::ModelSkin skin(*question.mesh, solved.x());
+  const Points normals = skin.node_normals();
+  double square = 0;
+  for (const VectorXd& force : forces) {
+    const Points moved = solved.sensitivities.moved_by(0, force);
+    for (std::size_t k = 0; k < skin.nodes().size(); ++k)
+      square += std::pow(moved.row(skin.nodes()[k]).dot(normals.row(static_cast<Index>(k))), 2);
+  }
+  moves.forces *= std::sqrt((1 - share_beyond_forces) * static_cast<double>(skin.nodes().size()) / square);
+  const Index z = u.size() + static_cast<Index>(nuisances.size());
+  JointMoves joint;
+  joint.mean = VectorXd::Zero(z), joint.sd = VectorXd::Ones(z);
+  for (Index i = 0; i < u.size(); ++i) {
+    const auto& prior = free.priors()[static_cast<std::size_t>(i)];
+    joint.sd[i] = prior ? prior->sd : open_sd;
+  }
+  fill_targets(joint, moves, places.there);
+  const double way = way_of(solved);
+  joint.target_errors = mesh_errors(places.there, mesh_share_of_way * way, beyond_forces_length_mm);
+  // The median of the half-Cauchy prior.
+  const double size = std::max(priors.least_unexplained_mm, priors.share_of_way * way);
+  joint.sizes_mm = VectorXd::Constant(1, size), joint.size_probability = VectorXd::Ones(1);
+  TargetRegions regions = told(question, places, condition(joint), names_of(free, nuisances));
+  regions.unexplained_mm = size;
+  return regions;
+}
+
+}  // namespace supine::diagnosis

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "segmentation/chest/chest_wall.h"
+#include "segmentation/masks.h"
+
+namespace supine::segmentation {
+
+/// How gland is told from fat inside the breast.
+struct GlandOptions {
+  /// dark: gland is darker than fat (T1). bright: brighter (fat suppressed).
+  enum class Contrast { dark, bright } contrast = Contrast::dark;
+  double shading_mm = 30;      ///< the finest lattice of the shading's B-splines; > 0
+  double neighbourhood = 0.3;  ///< of the Potts field; >= 0
+  double skin_mm = 5;          ///< next to the outside nothing is gland: skin, half-empty voxels; > 0
+  double chest_mm = 4;         ///< nor next to the chest; >= 0
+  double superficial_mm = 9;   ///< to here vessels and blurred skin run: gland only near the nipple
+  double fan_deg = 70;         ///< of a line from the nipple against the way to the chest; farther aside is axilla
+  double bridge_mm = 4;        ///< gaps that connected gland may have; >= 0
+  double least_ml = 0.3;       ///< smaller islands are not gland
+  double failed_share = 1.6;   ///< bright: where fat is brighter than so many times its median, suppression failed
+};
+
+/// What find_gland was given besides the greys; masks of the image's grid.
+struct GlandPlace {
+  const Mask& body;
+  const Mask& breast;  ///< the modelled part of the body without the chest
+  const Mask& chest;
+  double sternum_x_mm;  ///< parts left from right
+  double front_y_mm;    ///< what lies in front of it hangs from the chest: the skin over the sternum
+  double back_y_mm;     ///< behind it is axilla and flank
+};
+
+struct GlandResult {
+  Mask gland;
+  std::vector<float> fraction;  ///< of gland, 0 to 1 per voxel, 0 outside the breast; gland is where it is likely
+  double fat_sd = 0;            ///< of the fat's contrast, in its own grey (0.1 = 10 %), the median over the breast
+  double pure = 0;              ///< contrast of pure gland: 0.7 = 70 % darker, or brighter, than fat
+  double shading_low = 1, shading_high = 1;  ///< that was taken off, relative to its median
+  double failed_ml = 0;                      ///< of breast where suppression failed
+  double aside_ml = 0;  ///< that look like gland but lie elsewhere than gland does: vessels, axilla, islands
+};
+
+/// Finds the gland in a breast whose fat has the grey 100, roughly.
+///
+/// 1. Shading: the logarithm of the fat's grey as B-splines, coarse to fine, fitted to the voxels weighted by how
+/// likely
+///    they are fat; it begins with the fat under the skin, which every breast has.
+/// 2. Classes with neighbourhood (classify_gland); the share of gland in each voxel is its contrast over that of pure
+///    gland.
+/// 3. Place: not in skin, chest or failed suppression; inside the fan from the nipple to the chest; no small islands.
+/// @throws InputError  when the breast has too few voxels to fit
+GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const GlandOptions& options);
+
+}  // namespace supine::segmentation

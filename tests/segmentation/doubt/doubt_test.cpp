@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+// Made series of a drawn torso through the automatic recipes: what is found, and what is refused or doubted.
+#include <gtest/gtest.h>
+
+#include "phantom/mri/series.h"
+#include "segmentation/steps/recipe_toml.h"
+#include "segmentation/steps/run_recipe.h"
+#include "tests/segmentation/formats/image_files.h"
+
+namespace supine::segmentation {
+namespace {
+
+using phantom::MadeSeries;
+using phantom::Series;
+using phantom::Torso;
+
+constexpr std::uint64_t seed = 3;
+
+MadeSeries made(const Torso& torso, Series series, double voxel_mm = 2.2) {
+  return phantom::make_series(torso, seed, {.series = series, .voxel_mm = {voxel_mm, voxel_mm, 4}});
+}
+
+/// Dice of the breast and of its gland, between the folds and in front of where a reader ends it.
+std::pair<double, double> dice_of(const Torso& torso, const MadeSeries& series, const LabelImage& labels) {
+  double both[2] = {}, sum[2] = {};
+  const Grid& grid = labels.grid;
+  for (int k = 0; k < grid.size.z(); ++k)
+    for (int j = 0; j < grid.size.y(); ++j)
+      for (int i = 0; i < grid.size.x(); ++i) {
+        const Eigen::Vector3d p = grid.point(Eigen::Vector3d(i, j, k));
+        if (p.z() < torso.low_z_mm() || p.z() > torso.high_z_mm() || p.y() > torso.back_y_mm() - 10) continue;
+        const auto stuff = static_cast<phantom::Stuff>(series.truth.at(i, j, k));
+        const auto tissue = static_cast<Tissue>(labels.at(i, j, k));
+        const bool truth[2] = {stuff == phantom::Stuff::fat || stuff == phantom::Stuff::gland ||
+                                   stuff == phantom::Stuff::skin || stuff == phantom::Stuff::vessel,
+                               stuff == phantom::Stuff::gland},
+                   found[2] = {is_meshed(tissue), tissue == Tissue::gland};
+        for (const int n : {0, 1}) {
+          both[n] += truth[n] && found[n];
+          sum[n] += truth[n] + found[n];
+        }
+      }
+  return {2 * both[0] / sum[0], 2 * both[1] / sum[1]};
+}
+
+TEST(MadeSeries, BreastAndGlandOfADrawnTorsoAreFound) {
+  const Torso torso(seed);
+  const MadeSeries series = made(torso, Series::t1, 1.6);
+  const auto result = run_recipe(series.image, read_shipped_recipe("t1_auto"));
+  const auto [breast, gland] = dice_of(torso, series, result.labels);
+  EXPECT_GT(breast, 0.93);
+  EXPECT_GT(gland, 0.6);
+  ASSERT_EQ(result.fraction_gland.size(), series.gland_share.size());
+  double found = 0, truth = 0;
+  for (std::size_t n = 0; n < series.gland_share.size(); ++n) {
+    found += result.fraction_gland[n];
+    truth += series.gland_share[n];
+  }
+  EXPECT_NEAR(found / truth, 1, 0.4);
+}
+
+TEST(MadeSeries, ImagesOfAnotherKindAreRefused) {
+  const Torso torso(seed);
+  const auto said = [&](Series series, const char* recipe) {
+    return testing::message_of([&] { run_recipe(made(torso, series).image, read_shipped_recipe(recipe)); });
+  };
+  const std::string suppressed = said(Series::fatsat, "t1_auto"), plain = said(Series::t1, "fatsat_auto");
+  EXPECT_NE(suppressed.find("fatsat_auto"), std::string::npos) << suppressed;
+  EXPECT_NE(plain.find("t1_auto"), std::string::npos) << plain;
+}
+
+TEST(MadeSeries, AnImageThatEndsInABreastIsDoubted) {
+  const Torso torso(seed);
+  const MadeSeries series = made(torso, Series::t1);
+  GreyImage half{series.image.grid, {}};  // up to the left nipple
+  half.grid.size.x() = static_cast<int>(half.grid.continuous_index(torso.nipple_mm(1)).x());
+  for (int k = 0; k < half.grid.size.z(); ++k)
+    for (int j = 0; j < half.grid.size.y(); ++j)
+      for (int i = 0; i < half.grid.size.x(); ++i) half.voxels.push_back(series.image.at(i, j, k));
+  const auto result = run_recipe(half, read_shipped_recipe("t1_auto"));
+  bool edge = false;
+  for (const Doubt& doubt : result.doubts) edge = edge || doubt.what.find("ends inside a breast") != std::string::npos;
+  EXPECT_TRUE(edge);
+  for (const Picture& picture : pictures_of(result.doubts.front(), result.labels, half)) EXPECT_GT(picture.width, 50);
+}
+
+}  // namespace
+}  // namespace supine::segmentation

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "segmentation/gland/bspline_field.h"
+#include "segmentation/gland/tissue_classes.h"
+
+namespace supine::segmentation {
+namespace {
+
+Grid cube(int n, double spacing) {
+  Grid grid;
+  grid.size.setConstant(n);
+  grid.spacing_mm.setConstant(spacing);
+  return grid;
+}
+
+TEST(BSplineField, FollowsASmoothFieldThroughNoiseAndIgnoresWeightlessSamples) {
+  const Grid grid = cube(40, 3);
+  std::mt19937 random(3);
+  std::normal_distribution<float> noise(0, 0.05f);
+  const auto truth = [](int i, int j, int k) {
+    return static_cast<float>(0.8 * std::sin(i / 14.0) + 0.01 * j - 0.3 * std::cos(k / 20.0));
+  };
+  std::vector<FieldSample> samples;
+  for (int k = 0; k < 40; k += 2)
+    for (int j = 0; j < 40; j += 2)
+      for (int i = 0; i < 40; i += 2) {
+        samples.push_back({i, j, k, truth(i, j, k) + noise(random), 1});
+        samples.push_back({i, j, k, 50, 0});
+      }
+  BSplineField field(grid, 0);
+  for (const double spacing : {60.0, 60.0, 30.0, 30.0, 20.0}) {
+    std::vector<FieldSample> left = samples;
+    for (FieldSample& s : left) s.value -= static_cast<float>(field.at(s.i, s.j, s.k));
+    field.add(left, spacing);
+  }
+  double squares = 0;
+  int count = 0;
+  const std::vector<float> values = field.evaluate();
+  for (int k = 0; k < 40; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 40; ++i, ++count) {
+        const float value = values[grid.index(i, j, k)];
+        EXPECT_NEAR(value, field.at(i, j, k), 1e-5);
+        squares += std::pow(value - truth(i, j, k), 2);
+      }
+  EXPECT_LT(std::sqrt(squares / count), 0.03);
+}
+
+/// A ball of gland and one speck, in fat with noise.
+struct Ball {
+  Grid grid = cube(30, 2);
+  std::vector<float> contrast, deviation;
+  Mask within, truth;
+  explicit Ball(float speck) {
+    std::mt19937 random(5);
+    std::normal_distribution<float> noise(0, 0.2f);
+    for (int k = 0; k < 30; ++k)
+      for (int j = 0; j < 30; ++j)
+        for (int i = 0; i < 30; ++i) {
+          const bool gland = std::hypot(i - 15, j - 15, k - 15) < 8;
+          truth.push_back(gland);
+          contrast.push_back((gland ? 0.6f : 0) + noise(random));
+          deviation.push_back(0.2f);
+          within.push_back(1);
+        }
+    contrast[grid.index(3, 3, 3)] = speck;
+  }
+};
+
+TEST(GlandClasses, NeighboursHelpAgainstNoise) {
+  const Ball ball(0.7f);
+  const auto errors = [&](double neighbourhood) {
+    const GlandClasses classes =
+        classify_gland(ball.contrast, ball.deviation, ball.within, ball.grid, 0.6, neighbourhood);
+    int wrong = 0;
+    for (std::size_t n = 0; n < ball.truth.size(); ++n) wrong += (classes.probability[n] > 0.5f) != bool(ball.truth[n]);
+    return std::pair(wrong, classes.probability[ball.grid.index(3, 3, 3)]);
+  };
+  const auto [alone, speck_alone] = errors(0);
+  const auto [together, speck_together] = errors(0.8);
+  EXPECT_LT(together, alone / 3);
+  EXPECT_GT(speck_alone, 0.5f);
+  EXPECT_LT(speck_together, 0.5f);
+}
+
+TEST(GlandClasses, FindsTheShareOfGland) {
+  const Ball ball(0);
+  const GlandClasses classes = classify_gland(ball.contrast, ball.deviation, ball.within, ball.grid, 0.6, 0.6);
+  double truth = 0;
+  for (const auto gland : ball.truth) truth += gland;
+  EXPECT_NEAR(classes.prior, truth / static_cast<double>(ball.truth.size()), 0.02);
+}
+
+}  // namespace
+}  // namespace supine::segmentation
