@@ -337,9 +337,10 @@ std::string check_readings(const Readings& readings, const std::string& pose, bo
   }
   if (landmarks || !readings.side_unverified()) return {};
   return fmt::format(
-      "{}: its side is not verified: mirrored, left for right, it would fit as well ({:.1f} mm off, as given {:.1f} "
+      "the side of the {} scan is not verified: mirrored, left for right, it would fit as well ({:.1f} mm off, as "
+      "given {:.1f} "
       "mm). Landmarks would tell",
-      name, readings.mirrored->misfit_mm, readings.given.misfit_mm);
+      pose, readings.mirrored->misfit_mm, readings.given.misfit_mm);
 }
 
 }  // namespace supine::registration

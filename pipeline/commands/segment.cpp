@@ -107,7 +107,7 @@ class SegmentTool : public Tool {
     run.stage("check");
     check(measured, labels);
     findings.voxels = segmentation::count_tissues(labels);
-    check_volume(measured, labels, findings);
+    if (!measured.is_object()) check_volume(measured, labels, findings);
     count_sides(labels, findings);
     run.progress("counting components");
     findings.components = segmentation::count_components(labels);
@@ -130,7 +130,7 @@ class SegmentTool : public Tool {
  private:
   /// A body of the wrong size is one in the wrong unit.
   static void check_volume(const Case& measured, const LabelImage& labels, const Findings& findings) {
-    constexpr double least_ml = 5, most_ml = 20000;
+    constexpr double least_ml = 2, most_ml = 20000;
     const double ml = volume_ml(labels.grid, meshed(findings.voxels));
     if (ml >= least_ml && ml <= most_ml) return;
     throw InputError(

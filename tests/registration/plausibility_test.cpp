@@ -95,7 +95,8 @@ TEST(ScanReadings, WhereASymmetricBodyDoesNotTellItsSideThatIsSaid) {
   const auto hanging_dome = [](double x, double y) { return 1.7 * round_dome(x, y); };
   const Readings found = readings([](Points& p) { p.col(0) *= -1; }, round_dome, round_dome, +hanging_dome);
   EXPECT_FALSE(found.better);
-  EXPECT_NE(check_readings(found, "supine", false, "scan.ply").find("side is not verified"), std::string::npos);
+  EXPECT_NE(check_readings(found, "supine", false, "scan.ply").find("side of the supine scan is not verified"),
+            std::string::npos);
   EXPECT_EQ(check_readings(found, "supine", true, "scan.ply"), "") << "landmarks say which side it is";
 }
 
