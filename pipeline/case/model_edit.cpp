@@ -4,7 +4,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <string_view>
 #include <vector>
@@ -149,6 +151,19 @@ std::string without_effect(const fs::path& file, const std::string& name) {
   return text;
 }
 
+namespace {
+
+/// The shortest number that is read back as the same; of what rounding left beside a round one (a bound that went
+/// through a logarithm and back) the round one.
+std::string written(double value) {
+  constexpr double rounding = 4 * std::numeric_limits<double>::epsilon();
+  const std::string round = fmt::format("{:.12g}", value);
+  const bool same = std::abs(std::stod(round) - value) <= rounding * std::abs(value);
+  return same ? round : fmt::format("{}", value);
+}
+
+}  // namespace
+
 std::string with_values(const fs::path& file, const std::map<std::string, double>& values) {
   const toml::table table = parse_toml(file);
   std::vector<std::pair<toml::source_region, double>> places;
@@ -163,8 +178,7 @@ std::string with_values(const fs::path& file, const std::map<std::string, double
   for (const auto& [place, value] : places) {
     std::string& line = lines[place.begin.line - 1];
     const std::size_t begin = byte_of(line, place.begin.column), end = byte_of(line, place.end.column);
-    // 12 digits: a bound that went through a logarithm and back is the bound again.
-    line.replace(begin, end - begin, fmt::format("{:.12g}", value));
+    line.replace(begin, end - begin, written(value));
   }
   std::string edited;
   for (const std::string& line : lines) edited += line + "\n";

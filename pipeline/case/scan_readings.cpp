@@ -22,7 +22,9 @@ void check_scan(Run& run, const Case& measured, const Pose& pose, const calibrat
     if (other.pose != pose.name && other.x->rows() == mesh.points.rows()) add(other.pose, *other.x);
   add(measured.imaged_pose, mesh.points);
   const auto readings = registration::examine_readings(scan, shapes);
-  const std::string doubt = registration::check_readings(readings, pose.name, pose.landmarks.has_value(), name);
+  // A warning goes into sidecars, which do not depend on where the case lies.
+  const std::string told = readings.better ? name : pose.surface->filename().string();
+  const std::string doubt = registration::check_readings(readings, pose.name, pose.landmarks.has_value(), told);
   calibration::check_placement(scan, skin, mesh.muscle, name);
   if (!doubt.empty()) run.warn(doubt);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/case/model_edit.h"
 
+#include <cmath>
+
 #include "pipeline/case/model_file.h"
 #include "tests/pipeline/temporary_folder.h"
 
@@ -76,13 +78,20 @@ TEST_F(ModelEdit, NewValuesKeepEverythingElse) {
                                                 {"skin.young_modulus_kpa", 33.25},
                                                 {"ligament.stiffness_kpa_per_mm", 0.125}});
   std::string expected = text;
-  expected.replace(expected.find("value = 0.5"), 11, "value = 0.333333333333");
+  expected.replace(expected.find("value = 0.5"), 11, "value = 0.3333333333333333");
   expected.replace(expected.find("value = 20"), 10, "value = 33.25");
   expected.replace(expected.find("value = 0.4"), 11, "value = 0.125");
   EXPECT_EQ(edited, expected);
   const simulation::Model model = read_model(file(edited));
-  EXPECT_NEAR(model.breast.young_modulus_kpa.value, 1.0 / 3, 1e-12);
+  EXPECT_EQ(model.breast.young_modulus_kpa.value, 1.0 / 3);
   EXPECT_EQ(model.skin.young_modulus_kpa.value, 33.25);
+}
+
+TEST_F(ModelEdit, AValueThatRoundingPutBesideItsBoundIsTheBound) {
+  const auto path = file("[breast]\nyoung_modulus_kpa = { value = 500, prior_sd = 400, lower = 50, upper = 5000 }\n");
+  const double fitted = std::nextafter(50.0, 0.0);
+  EXPECT_EQ(read_model(file(with_values(path, {{"breast.young_modulus_kpa", fitted}}))).breast.young_modulus_kpa.value,
+            50);
 }
 
 TEST_F(ModelEdit, AFixedNumberIsReplacedToo) {
