@@ -52,6 +52,20 @@ double bend(const Points& index, const Indices& cells, int c, const Eigen::Matri
   return 1.5 * most + inside_tolerance;
 }
 
+/// Voxels of a slice that a cell's box may hold.
+struct Window {
+  int i0, i1, j0, j1;
+
+  /// @param box   least and largest index, 2 by 3
+  /// @param size  voxels of the grid
+  template <class Box, class Size>
+  Window(const Box& box, const Size& size)
+      : i0(std::max(0, static_cast<int>(std::ceil(box(0, 0) - inside_tolerance)))),
+        i1(std::min(static_cast<int>(size.x()) - 1, static_cast<int>(std::floor(box(1, 0) + inside_tolerance)))),
+        j0(std::max(0, static_cast<int>(std::ceil(box(0, 1) - inside_tolerance)))),
+        j1(std::min(static_cast<int>(size.y()) - 1, static_cast<int>(std::floor(box(1, 1) + inside_tolerance)))) {}
+};
+
 }  // namespace
 
 void Slab::start(const segmentation::Grid& grid, int from, int slices) {
@@ -93,13 +107,9 @@ void CellRaster::visit_linear(int cell, int k, Found found) const {
   if (!map.allFinite()) return;
   Eigen::Matrix<double, 3, 4> way;
   for (int a = 0; a < 4; ++a) way.col(a) = way_.row(mesh_.cells(cell, a)).transpose();
-  const auto box = box_of(index_, mesh_.cells, cell);
-  const int i0 = std::max(0, static_cast<int>(std::ceil(box(0, 0) - inside_tolerance)));
-  const int i1 = std::min(grid_.size.x() - 1, static_cast<int>(std::floor(box(1, 0) + inside_tolerance)));
-  const int j0 = std::max(0, static_cast<int>(std::ceil(box(0, 1) - inside_tolerance)));
-  const int j1 = std::min(grid_.size.y() - 1, static_cast<int>(std::floor(box(1, 1) + inside_tolerance)));
-  for (int j = j0; j <= j1; ++j)
-    for (int i = i0; i <= i1; ++i) {
+  const Window window(box_of(index_, mesh_.cells, cell), grid_.size);
+  for (int j = window.j0; j <= window.j1; ++j)
+    for (int i = window.i0; i <= window.i1; ++i) {
       const Eigen::Vector4d b = map * Eigen::Vector4d(i, j, k, 1);
       const double least = b.minCoeff();
       if (least >= -inside_tolerance)
@@ -114,13 +124,9 @@ void CellRaster::visit_quadratic(int cell, int k, Found found) const {
   const double below = bend(index_, mesh_.cells, cell, map);
   const simulation::CurvedCell curved(target_, mesh_.cells, cell);
   const auto way = simulation::gather<10>(way_, mesh_.cells, cell);
-  const auto box = box_of(index_, mesh_.cells, cell);
-  const int i0 = std::max(0, static_cast<int>(std::ceil(box(0, 0) - inside_tolerance)));
-  const int i1 = std::min(grid_.size.x() - 1, static_cast<int>(std::floor(box(1, 0) + inside_tolerance)));
-  const int j0 = std::max(0, static_cast<int>(std::ceil(box(0, 1) - inside_tolerance)));
-  const int j1 = std::min(grid_.size.y() - 1, static_cast<int>(std::floor(box(1, 1) + inside_tolerance)));
-  for (int j = j0; j <= j1; ++j)
-    for (int i = i0; i <= i1; ++i) {
+  const Window window(box_of(index_, mesh_.cells, cell), grid_.size);
+  for (int j = window.j0; j <= window.j1; ++j)
+    for (int i = window.i0; i <= window.i1; ++i) {
       const Eigen::Vector4d straight = map * Eigen::Vector4d(i, j, k, 1);
       if (straight.minCoeff() < -below) continue;
       const auto b = curved.inside(grid_.point(Eigen::Vector3d(i, j, k)), straight);

@@ -59,8 +59,7 @@ void start_stiffer(Run& run, MeasuredCase& in, const std::vector<simulation::Pos
   const auto found = simulation::find_carrying_modulus(in.mesh, in.anatomy, in.model, loads, search);
   run.warn(fmt::format(
       "{}: breast.young_modulus_kpa = {:.3g} carries the body under {:.0f} % of gravity only; {:.3g}, which carries "
-      "it, "
-      "is taken to start from and as the middle of its prior. supine-simulate --find-modulus finds the least",
+      "it, is taken to start from and as the middle of its prior. supine-simulate --find-modulus finds the least",
       in.model_file.string(), modulus.value, 100 * carried, clear_of_the_end * found.carries_kpa));
   modulus.value = std::min(clear_of_the_end * found.carries_kpa, modulus.upper);
   in.start = simulation::Chain(in.mesh, in.anatomy, in.model, loads).solve(in.model, &found.solution);
