@@ -22,6 +22,11 @@ double scale_of(const Setting& setting, const Parameter& row) {
   return std::max(std::abs(setting.value), 1e-3);
 }
 
+void check_start(const std::string& name, double value, double low, double high) {
+  if (value < low || value > high)
+    throw InputError(fmt::format("{} = {}: the start must lie in its range, {} to {}", name, value, low, high));
+}
+
 void push(Eigen::VectorXd& vector, double value) {
   vector.conservativeResize(vector.size() + 1);
   vector[vector.size() - 1] = value;
@@ -46,8 +51,7 @@ FreeParameters::FreeParameters(simulation::Model model, std::vector<std::string>
 void FreeParameters::add(const std::string& name, const Setting& setting) {
   const Parameter& row = *simulation::find_parameter(name);
   const double low = std::max(setting.lower, row.lower), high = std::min(setting.upper, row.upper);
-  if (setting.value < low || setting.value > high)
-    throw InputError(fmt::format("{} = {}: the start must lie in its range, {} to {}", name, setting.value, low, high));
+  check_start(name, setting.value, low, high);
   const auto i = static_cast<Eigen::Index>(scale_.size());
   units_.push_back(row.unit);
   log_.push_back(low > 0);
@@ -59,6 +63,15 @@ void FreeParameters::add(const std::string& name, const Setting& setting) {
   if (!setting.prior_sd) return;
   const double sd = log_.back() ? std::log1p(*setting.prior_sd / setting.value) : *setting.prior_sd / scale_.back();
   priors_.back() = Prior{start_[i], sd};
+}
+
+void FreeParameters::begin_with(const simulation::Model& model) {
+  for (Eigen::Index i = 0; i < size(); ++i) {
+    const std::string& name = names_[static_cast<std::size_t>(i)];
+    const double number = simulation::find_setting(model, name)->value;
+    check_start(name, number, value(i, lower_[i]), value(i, upper_[i]));
+    start_[i] = coordinate(i, number);
+  }
 }
 
 Eigen::VectorXd FreeParameters::prior_deviation(const Eigen::VectorXd& u) const {

@@ -54,15 +54,16 @@ std::vector<Pose> measured_poses(const Case& c) {
 /// A fit needs a shape to start from: a free modulus under which there is none is raised to one that has one.
 void start_stiffer(Run& run, MeasuredCase& in, const std::vector<simulation::PoseLoad>& loads, double carried) {
   constexpr double close_enough = 1.3, clear_of_the_end = 1.1;
-  simulation::Setting& modulus = in.model.breast.young_modulus_kpa;
+  const simulation::Setting& modulus = in.model.breast.young_modulus_kpa;
   simulation::ModulusSearch search{.ratio = close_enough, .softest_kpa = modulus.value, .stiffest_kpa = modulus.upper};
   const auto found = simulation::find_carrying_modulus(in.mesh, in.anatomy, in.model, loads, search);
   run.warn(fmt::format(
       "{}: breast.young_modulus_kpa = {:.3g} carries the body under {:.0f} % of gravity only; {:.3g}, which carries "
-      "it, is taken to start from and as the middle of its prior. supine-simulate --find-modulus finds the least",
+      "it, is where the search begins (its prior stays). supine-simulate --find-modulus finds the least",
       in.model_file.string(), modulus.value, 100 * carried, clear_of_the_end * found.carries_kpa));
-  modulus.value = std::min(clear_of_the_end * found.carries_kpa, modulus.upper);
-  in.start = simulation::Chain(in.mesh, in.anatomy, in.model, loads).solve(in.model, &found.solution);
+  in.carrying_modulus_kpa = std::min(clear_of_the_end * found.carries_kpa, modulus.upper);
+  const simulation::Model stiffer = in.begin_with(in.model);
+  in.start = simulation::Chain(in.mesh, in.anatomy, stiffer, loads).solve(stiffer, &found.solution);
 }
 
 void solve_start(Run& run, MeasuredCase& in, const std::vector<Pose>& poses) {
@@ -155,6 +156,12 @@ calibration::MeasuredScene scene_of(const MeasuredCase& in, bool whole, bool mar
 
 }  // namespace
 
+simulation::Model MeasuredCase::begin_with(simulation::Model wanted) const {
+  double& modulus = wanted.breast.young_modulus_kpa.value;
+  if (carrying_modulus_kpa) modulus = std::max(modulus, *carrying_modulus_kpa);
+  return wanted;
+}
+
 calibration::MeasuredScene MeasuredCase::fitted_scene() const { return scene_of(*this, false, false); }
 
 calibration::MeasuredScene MeasuredCase::marked_scene() const { return scene_of(*this, false, true); }
@@ -171,7 +178,7 @@ std::vector<double> MeasuredCase::noise_mm(calibration::Evaluator& evaluator) co
       noise.push_back(*measurements[m]->noise_mm);
       continue;
     }
-    if (prediction.poses.empty()) prediction = evaluator.predict(model, &start);
+    if (prediction.poses.empty()) prediction = evaluator.predict(begin_with(model), &start);
     auto mask = calibration::points_over_skin(prediction);
     for (std::size_t other = 0; other < mask.size(); ++other)
       if (other != m) mask[other].setConstant(false);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,14 +23,20 @@ namespace supine::pipeline {
 struct MeasuredCase {
   Case description;
   std::filesystem::path model_file;
-  simulation::Model model;  ///< as given, or stiffer where that has no equilibrium
+  simulation::Model model;  ///< as given
+  /// breast.young_modulus_kpa to begin with, where the given one has no equilibrium.
+  std::optional<double> carrying_modulus_kpa;
   meshing::TetMesh mesh;
   meshing::Anatomy anatomy;
   std::vector<calibration::Measurement> fitted;    ///< in the order of [calibration] poses
   std::vector<calibration::Measurement> held_out;  ///< every other measured pose
   /// Of the poses that have some, by name; without sigma_mm in either file 1.5 mm.
   std::map<std::string, calibration::MeasuredLandmarks> landmarks;
-  simulation::ChainSolution start;  ///< of the model; poses: fitted, then held out
+  simulation::ChainSolution start;  ///< of begin_with(model); poses: fitted, then held out
+
+  /// A model with numbers that a search can begin with: the same, or with the modulus raised to one that carries the
+  /// body.
+  simulation::Model begin_with(simulation::Model wanted) const;
 
   /// The surfaces that are fitted.
   calibration::MeasuredScene fitted_scene() const;
@@ -43,8 +50,8 @@ struct MeasuredCase {
 };
 
 /// Reads and checks all of it, and solves the model as given once, because only a predicted skin tells which side of a
-/// scan is outside and whether it lies at the body. A free breast.young_modulus_kpa under which there is no equilibrium
-/// is raised to one under which there is, with a warning.
+/// scan is outside and whether it lies at the body. Where there is no equilibrium under a free
+/// breast.young_modulus_kpa, what begins here begins with one under which there is, with a warning; priors stay.
 /// @throws InputError  a fitted pose without a surface; no interface; side = "both" without two breasts; a scan that is
 ///   not at the body; a landmark without a place in prone; effects that can change nothing
 /// @throws NumericalFailure  no equilibrium with the model as given, and its modulus is fixed or nothing in its range

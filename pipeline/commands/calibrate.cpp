@@ -109,7 +109,8 @@ class CalibrateTool : public Tool {
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
     simulation::Model model = with_population(run, measured_->description, measured_->model);
     if (scan_offset_) add_scan_offset(model);
-    const FreeParameters parameters(model);
+    FreeParameters parameters(model);
+    parameters.begin_with(measured_->begin_with(model));
     if (map_ > 0 && parameters.size() < 2) throw InputError("--map needs two free parameters, the model has one");
     Evaluator evaluator(measured_->fitted_scene(), model);
     const CalibrationResult result = calibrate(run, evaluator, parameters);
@@ -209,8 +210,9 @@ class CalibrateTool : public Tool {
     joint.priors.patchiness = read_patchiness(measured_->model_file);
     joint.progress = [&live](const std::string& what) { live.show(what); };
     Evaluator evaluator(measured_->marked_scene(), parameters.base(), diagnosis::accurate_enough());
-    diagnosis::BaseFit base = diagnosis::fit_base_model(evaluator, parameters.base(), parameters.base(),
-                                                        options.noise_mm, &measured_->start, joint);
+    diagnosis::BaseFit base =
+        diagnosis::fit_base_model(evaluator, parameters.base(), measured_->begin_with(parameters.base()),
+                                  options.noise_mm, &measured_->start, joint);
     const diagnosis::JointPosterior posterior = diagnosis::posterior_of(base);
     for (Eigen::Index k = parameters.size(); k < posterior.value.size(); ++k)
       result.nuisances.push_back({posterior.names[static_cast<std::size_t>(k)], posterior.value[k], posterior.sd[k]});

@@ -220,7 +220,7 @@ Json forces_json(const Findings& found) {
 
 diagnosis::Subject subject_of(const MeasuredCase& measured, const simulation::Model& given,
                               const std::vector<double>& noise_mm) {
-  return {measured.whole_scene(), given, measured.model, noise_mm, nullptr};
+  return {measured.whole_scene(), given, measured.begin_with(measured.model), noise_mm, nullptr};
 }
 
 DiagnosisResult complete(const MeasuredCase& measured, std::unique_ptr<Findings> found) {

@@ -53,6 +53,18 @@ TEST(FreeParameters, ModelCarriesTheNumbersAndNothingElseChanges) {
   EXPECT_EQ(model.skin.young_modulus_kpa.value, 20);
 }
 
+TEST(FreeParameters, ASearchMayBeginElsewhereThanInTheMiddleOfThePrior) {
+  FreeParameters parameters(model_with_ligament());
+  simulation::Model stiffer = model_with_ligament();
+  stiffer.breast.young_modulus_kpa.value = 1.5;
+  parameters.begin_with(stiffer);
+  EXPECT_NEAR(parameters.value(0, parameters.start()[0]), 1.5, 1e-14);
+  EXPECT_NEAR(parameters.priors()[0]->mean, std::log(0.5), 1e-15);
+  EXPECT_NEAR(parameters.value(1, parameters.start()[1]), 0.4, 1e-15);
+  stiffer.breast.young_modulus_kpa.value = 6;
+  EXPECT_THROW(parameters.begin_with(stiffer), InputError);
+}
+
 TEST(FreeParameters, PriorOfAPositiveParameterIsLogNormal) {
   const FreeParameters parameters(model_with_ligament());
   ASSERT_TRUE(parameters.priors()[0]);
