@@ -101,7 +101,7 @@ void check_exportable(Solver solver, const meshing::TetMesh& mesh, const meshing
   const Words words = words_of(solver, model.breast.law);
   if (mesh.order() != 1)
     refuse(words, "this mesh: quadratic cells are not written (each program places their points differently)",
-           "mesh with supine-tetrahedralise --order 1");
+           "make the mesh with supine-tetrahedralise --order 1 (make CASE=... ORDER=1)");
   if (!mesh.support_names.empty())
     refuse(words, "supports with names (an object: springs along and across the normal)",
            "only a breast on its muscle is written");

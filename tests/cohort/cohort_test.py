@@ -13,7 +13,7 @@ import tempfile
 import unittest
 
 SOURCE, BIN, SMALL = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
-SETTINGS = "TRIANGLES=800 MAX_DISTANCE_MM=3 SAMPLES=5"
+SETTINGS = "ORDER=1 TRIANGLES=800 MAX_DISTANCE_MM=3 SAMPLES=5"
 
 
 def run(command):

@@ -8,7 +8,7 @@ work=$(realpath -m "${1:?slurm.sh WORK BIN [CASES] [DRAWS]}") bin=$(realpath "$2
 cd "$(dirname "$0")/../.."
 rm -rf "$work"
 mkdir -p "$work"/{munge,state,spool,answers,cohort}
-settings="TRIANGLES=400 MAX_DISTANCE_MM=4 SAMPLES=$draws PARTS=4"
+settings="ORDER=1 TRIANGLES=400 MAX_DISTANCE_MM=4 SAMPLES=$draws PARTS=4"
 
 say() { echo "[$(date +%T)] $*"; }
 stop_all() {

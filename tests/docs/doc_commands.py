@@ -39,7 +39,7 @@ DEAR = {
     "bench/": "a measurement, part of make bench or make study",
     "xvfb-run": "draws a picture of the docs from a finished run",
 }
-COARSE = {"TRIANGLES": "600", "MAX_DISTANCE_MM": "4", "OMP_NUM_THREADS": "1", "CALIBRATE": "", "THREADS": "1"}
+COARSE = {"ORDER": "1", "TRIANGLES": "600", "MAX_DISTANCE_MM": "4", "OMP_NUM_THREADS": "1", "CALIBRATE": "", "THREADS": "1"}
 # Words that a synopsis uses for the reader's own names.
 PLACEHOLDER = re.compile(r"[\[\]…|]|\.\.\.|\b(CASE|OUT|FILE|FOLDER|NAME|MM|EFFECT|DATA|WORK|POSE)\b(?!=)|=dir\b|\bdir/")
 

@@ -170,7 +170,7 @@ TEST(PhantomTool, CalibratedNullComesBackToItsModuli) {
   ASSERT_EQ(finished.code, 0) << finished.err;
   const Finished calibrated =
       run_process({"make", "-f", std::string(SUPINE_SOURCE_DIR) + "/pipeline/Makefile", "BIN=" SUPINE_BIN_DIR,
-                   "CASE=" + made.string(), "OUT=" + out.string(), "TRIANGLES=1500", (out / "model.toml").string()});
+                   "CASE=" + made.string(), "OUT=" + out.string(), "ORDER=1", "TRIANGLES=1500", (out / "model.toml").string()});
   ASSERT_EQ(calibrated.code, 0) << calibrated.err;
   const Json truth = Json::parse(read_text(folder / "answers/case-001.json"))["base"];
   const Json fitted = Json::parse(read_text(out / "calibration.json"));

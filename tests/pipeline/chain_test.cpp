@@ -87,6 +87,16 @@ TEST_F(Make, DecimatesAgainWhenAskedForAnotherSize) {
   expect_words(finished.out, {"supine-decimate"});
 }
 
+TEST_F(Make, MeshesWithQuadraticCellsBentOntoTheFineSurfaceUnlessToldOtherwise) {
+  std::vector<std::string> command = make_command(case_folder());
+  std::erase_if(command, [](const std::string& word) { return word == "ORDER=1" || word == "TRIANGLES=800"; });
+  command.insert(command.end(), {"-n", "mesh"});
+  const Finished finished = run_process(command);
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  expect_words(finished.out, {"supine-decimate", "--order 2", "supine-tetrahedralise", "--order 2 --fine"});
+  EXPECT_FALSE(contains(finished.out, "--triangles")) << finished.out;
+}
+
 TEST_F(Make, WritesElsewhereWhenTheCaseIsReadOnly) {
   fs::remove_all(out());
   const auto before = files_in(case_folder());

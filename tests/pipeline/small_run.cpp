@@ -42,6 +42,7 @@ std::vector<std::string> make_command(const std::filesystem::path& folder) {
           "BIN=" SUPINE_BIN_DIR,
           "CASE=" + folder.string(),
           "OUT=" + (folder / "out").string(),
+          "ORDER=1",
           "TRIANGLES=800",
           "MAX_DISTANCE_MM=2",
           "THREADS=2"};
