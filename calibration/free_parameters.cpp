@@ -65,7 +65,7 @@ void FreeParameters::add(const std::string& name, const Setting& setting) {
   priors_.back() = Prior{start_[i], sd};
 }
 
-void FreeParameters::begin_with(const simulation::Model& model) {
+void FreeParameters::begin_with(simulation::Model model) {
   for (Eigen::Index i = 0; i < size(); ++i) {
     const std::string& name = names_[static_cast<std::size_t>(i)];
     const double number = simulation::find_setting(model, name)->value;

@@ -35,7 +35,7 @@ class FreeParameters {
   const Eigen::VectorXd& start() const { return start_; }
   /// Searches begin with the numbers of @p model, which has all of these parameters; priors stay where they are.
   /// @throws InputError  a number outside its range
-  void begin_with(const simulation::Model& model);
+  void begin_with(simulation::Model model);
   const Eigen::VectorXd& lower() const { return lower_; }
   const Eigen::VectorXd& upper() const { return upper_; }
   /// One per parameter; none where the model names no prior_sd.
