@@ -21,7 +21,7 @@ struct GlandOptions {
   double fan_deg = 70;         ///< of a line from the nipple against the way to the chest; farther aside is axilla
   double bridge_mm = 4;        ///< gaps that connected gland may have; >= 0
   double least_ml = 0.3;       ///< smaller islands are not gland
-  double least_share = 0.45;   ///< of gland in a voxel that is labelled gland, 0 to below 1; 0 = any
+  double least_share = 0.35;   ///< of gland in a voxel that is labelled gland, 0 to below 1; 0 = any
   double failed_share = 1.6;   ///< bright: where fat is brighter than so many times its median, suppression failed
 };
 
