@@ -17,6 +17,7 @@
 
 #include "common/error.h"
 #include "common/trial_process.h"
+#include "segmentation/formats/dicom_segmentation.h"
 #include "segmentation/formats/image_formats.h"
 #include "segmentation/formats/samples.h"
 
@@ -56,16 +57,9 @@ std::vector<double> numbers(const std::string& text) {
   return values;
 }
 
-/// Whether the file begins as DICOM files do: 128 bytes, then DICM. Others would make the library guess.
-bool has_preamble(const fs::path& file) {
-  char bytes[132] = {};
-  std::ifstream(file, std::ios::binary).read(bytes, sizeof bytes);
-  return std::string(bytes + 128, 4) == "DICM";
-}
-
 /// The header, or nothing for a file that is not a DICOM image.
 std::optional<Slice> read_header(const fs::path& file) {
-  if (!has_preamble(file)) return std::nullopt;
+  if (!formats::is_dicom(file)) return std::nullopt;  // others would make the library guess
   gdcm::Reader reader;
   reader.SetFileName(file.c_str());
   if (!reader.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0000))) return std::nullopt;
@@ -154,7 +148,8 @@ void check_slice(const Slice& s) {
   if (s.samples != 1)
     refuse(s, fmt::format("colour ({} samples per pixel); a grey volume is needed: choose another series", s.samples));
   if (s.frames != 1)
-    refuse(s, fmt::format("{} frames in one file; convert the series to one slice per file, or to NRRD or NIfTI",
+    refuse(s, fmt::format("{} frames in one file; convert the series to one slice per file, or to NRRD or NIfTI (a "
+                          "DICOM segmentation is named as a file, not by its folder)",
                           s.frames));
   if (s.position.size() != 3 || s.orientation.size() != 6 || s.spacing.size() != 2)
     refuse(s,
