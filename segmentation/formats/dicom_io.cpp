@@ -17,7 +17,7 @@
 
 #include "common/error.h"
 #include "common/trial_process.h"
-#include "segmentation/formats/dicom_segmentation.h"
+#include "segmentation/formats/dicom_file.h"
 #include "segmentation/formats/image_formats.h"
 #include "segmentation/formats/samples.h"
 
@@ -259,23 +259,9 @@ std::optional<formats::SampleType> sample_type(gdcm::PixelFormat::ScalarType typ
   }
 }
 
-/// Whether the file ends before its pixels do, which the library does not mind: little endian (7fe0,0010), then in
-/// explicit files VR and two bytes, then the length.
-bool cut_short(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
-  const std::size_t tag = bytes.find(std::string("\xE0\x7F\x10\x00", 4));
-  if (tag == std::string::npos || tag + 12 > bytes.size()) return true;
-  const bool explicit_vr = bytes[tag + 4] == 'O';
-  std::uint32_t length = 0;
-  for (int b = 3; b >= 0; --b)
-    length = length << 8 | static_cast<unsigned char>(bytes[tag + (explicit_vr ? 8 : 4) + static_cast<std::size_t>(b)]);
-  return length != 0xFFFFFFFF && tag + (explicit_vr ? 12 : 8) + length > bytes.size();
-}
-
 /// Appends the rescaled greys of one slice.
 void append_pixels(const Slice& slice, std::vector<float>& voxels) {
-  if (cut_short(slice.file)) refuse(slice, "the file ends before its pixels do: cut short; copy it again");
+  if (formats::is_cut_short(slice.file)) refuse(slice, "the file ends before its pixels do: cut short; copy it again");
   gdcm::ImageReader reader;
   reader.SetFileName(slice.file.c_str());
   if (!reader.Read())

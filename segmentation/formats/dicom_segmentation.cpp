@@ -10,12 +10,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
-#include <fstream>
 #include <optional>
 
 #include "common/error.h"
 #include "common/trial_process.h"
+#include "segmentation/formats/dicom_file.h"
 
 namespace supine::segmentation::formats {
 namespace {
@@ -217,8 +216,9 @@ RawImage read(const fs::path& file) {
   if (!pixels) refuse(file, "its pixels are compressed or missing; export the segmentation uncompressed");
   const std::size_t plane = static_cast<std::size_t>(header.rows) * header.columns,
                     needed = (plane * header.frames.size() * static_cast<std::size_t>(header.bits) + 7) / 8;
+  if (is_cut_short(file)) refuse(file, "the file ends before its pixels do: cut short; copy it again");
   if (pixels->GetLength() < needed)
-    refuse(file, fmt::format("holds {} bytes of pixels, {} are expected: cut short; copy it again",
+    refuse(file, fmt::format("holds {} bytes of pixels, {} are expected: damaged; export it again",
                              static_cast<std::size_t>(pixels->GetLength()), needed));
   const auto* bytes = reinterpret_cast<const unsigned char*>(pixels->GetPointer());
   std::size_t twice = 0;
@@ -238,12 +238,6 @@ RawImage read(const fs::path& file) {
 }
 
 }  // namespace
-
-bool is_dicom(const fs::path& file) {
-  char bytes[132] = {};
-  std::ifstream(file, std::ios::binary).read(bytes, sizeof bytes);
-  return std::memcmp(bytes + 128, "DICM", 4) == 0;
-}
 
 RawImage read_dicom_segmentation(const fs::path& file) {
   // GDCM's assertions end the process on damaged files.

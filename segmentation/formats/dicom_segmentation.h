@@ -7,9 +7,6 @@
 
 namespace supine::segmentation::formats {
 
-/// Whether a file begins as DICOM files do.
-bool is_dicom(const std::filesystem::path& file);
-
 /// Reads a DICOM segmentation (SEG; DICOM PS3.3 A.51) as a label map: every voxel has the number of the segment that
 /// covers it, 0 where none does. Frames that are not stored are empty. Binary, fractional (half and more counts) and
 /// label map; not compressed. Where segments overlap the higher number holds, with a warning.

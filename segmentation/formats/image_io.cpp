@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "common/error.h"
+#include "segmentation/formats/dicom_file.h"
 #include "segmentation/formats/dicom_segmentation.h"
 #include "segmentation/formats/image_formats.h"
 
