@@ -114,6 +114,25 @@ class Search {
   Eigen::ArrayXXd superellipse_;  // sample of the superellipse on each ray
 };
 
+/// Makes places dear that lie far in front of the skin over the sternum of their level: there is breast.
+void hold_back(const FrontSkin& front, const ChestWall& wall, const RayProfiles& profiles,
+               const ChestWallOptions& options, std::vector<float>& costs) {
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index k = 0; k < profiles.levels(); ++k) {
+    const double skin = front.at(wall.torso.sternum_x(wall.z(k)), wall.z(k)),
+                 foremost = (std::isnan(skin) ? wall.torso.sternum_skin_y_mm : skin) - options.ahead_mm;
+    for (Eigen::Index a = 0; a < profiles.angles(); ++a) {
+      if (!profiles.seen(a, k)) continue;
+      const double ahead = std::cos(wall.angle(a));
+      float* cost = costs.data() + profiles.ray(a, k) * profiles.count;
+      for (int i = 0; i < profiles.count; ++i) {
+        const double too_far = foremost - (wall.centre_y_mm - ahead * profiles.radius_mm(a, k, i));
+        if (too_far > 0) cost[i] += static_cast<float>(options.ahead_cost_per_mm * too_far);
+      }
+    }
+  }
+}
+
 /// The superellipse whose border is cheapest, taken over a few millimetres to either side: no chest is one.
 Superellipse fit_superellipse(const RayProfiles& profiles, const std::vector<float>& costs, const ChestWall& wall,
                               double centre_depth_mm) {
@@ -231,6 +250,7 @@ ChestWall find_chest_wall(const GreyImage& image, const Mask& body, const Torso&
       sample_rays(image, body, wall, Eigen::ArrayXXd::Zero(2 * half + 1, front.y_mm.cols()), 0, farthest_mm);
   if (lines) blur_profiles(profiles, first_look.angles, first_look.levels);
   std::vector<float> costs = boundary_costs(profiles, options);
+  hold_back(front, wall, profiles, options, costs);
   wall.superellipse = fit_superellipse(profiles, costs, wall, options.centre_depth_mm);
   settle(profiles, costs, options, wall);
   if (!lines) {
@@ -245,6 +265,7 @@ ChestWall find_chest_wall(const GreyImage& image, const Mask& body, const Torso&
     profiles = sample_rays(image, body, wall, wall.radius_mm, -look.reach_mm, look.reach_mm);
     blur_profiles(profiles, look.angles, look.levels);
     costs = boundary_costs(profiles, options, true);
+    hold_back(front, wall, profiles, options, costs);
     settle(profiles, costs, options, wall);
   }
   return wall;

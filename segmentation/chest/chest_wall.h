@@ -24,6 +24,8 @@ struct ChestWallOptions {
   double coupling_per_mm = 0.012;  ///< cost of a step between neighbouring levels
   double far_weight = 0.4;         ///< cost of 10 mm of dark tissue farther out: the border is the outermost
   double oval_pull_per_mm = 0.005;  ///< cost of a distance from the superellipse, as far as 25 mm; >= 0
+  double ahead_mm = 12;             ///< the wall comes so far in front of the skin over the sternum; >= 0
+  double ahead_cost_per_mm = 0.1;   ///< beyond that: dense gland may look like muscle, but hangs in front
   double refine_mm = 3;             ///< at most this far the border then moves to the half-way grey
 };
 

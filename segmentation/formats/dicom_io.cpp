@@ -17,6 +17,7 @@
 
 #include "common/error.h"
 #include "common/trial_process.h"
+#include "segmentation/formats/dicom_file.h"
 #include "segmentation/formats/image_formats.h"
 #include "segmentation/formats/samples.h"
 
@@ -56,16 +57,9 @@ std::vector<double> numbers(const std::string& text) {
   return values;
 }
 
-/// Whether the file begins as DICOM files do: 128 bytes, then DICM. Others would make the library guess.
-bool has_preamble(const fs::path& file) {
-  char bytes[132] = {};
-  std::ifstream(file, std::ios::binary).read(bytes, sizeof bytes);
-  return std::string(bytes + 128, 4) == "DICM";
-}
-
 /// The header, or nothing for a file that is not a DICOM image.
 std::optional<Slice> read_header(const fs::path& file) {
-  if (!has_preamble(file)) return std::nullopt;
+  if (!formats::is_dicom(file)) return std::nullopt;  // others would make the library guess
   gdcm::Reader reader;
   reader.SetFileName(file.c_str());
   if (!reader.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0000))) return std::nullopt;
@@ -154,7 +148,8 @@ void check_slice(const Slice& s) {
   if (s.samples != 1)
     refuse(s, fmt::format("colour ({} samples per pixel); a grey volume is needed: choose another series", s.samples));
   if (s.frames != 1)
-    refuse(s, fmt::format("{} frames in one file; convert the series to one slice per file, or to NRRD or NIfTI",
+    refuse(s, fmt::format("{} frames in one file; convert the series to one slice per file, or to NRRD or NIfTI (a "
+                          "DICOM segmentation is named as a file, not by its folder)",
                           s.frames));
   if (s.position.size() != 3 || s.orientation.size() != 6 || s.spacing.size() != 2)
     refuse(s,
@@ -264,23 +259,9 @@ std::optional<formats::SampleType> sample_type(gdcm::PixelFormat::ScalarType typ
   }
 }
 
-/// Whether the file ends before its pixels do, which the library does not mind: little endian (7fe0,0010), then in
-/// explicit files VR and two bytes, then the length.
-bool cut_short(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
-  const std::size_t tag = bytes.find(std::string("\xE0\x7F\x10\x00", 4));
-  if (tag == std::string::npos || tag + 12 > bytes.size()) return true;
-  const bool explicit_vr = bytes[tag + 4] == 'O';
-  std::uint32_t length = 0;
-  for (int b = 3; b >= 0; --b)
-    length = length << 8 | static_cast<unsigned char>(bytes[tag + (explicit_vr ? 8 : 4) + static_cast<std::size_t>(b)]);
-  return length != 0xFFFFFFFF && tag + (explicit_vr ? 12 : 8) + length > bytes.size();
-}
-
 /// Appends the rescaled greys of one slice.
 void append_pixels(const Slice& slice, std::vector<float>& voxels) {
-  if (cut_short(slice.file)) refuse(slice, "the file ends before its pixels do: cut short; copy it again");
+  if (formats::is_cut_short(slice.file)) refuse(slice, "the file ends before its pixels do: cut short; copy it again");
   gdcm::ImageReader reader;
   reader.SetFileName(slice.file.c_str());
   if (!reader.Read())

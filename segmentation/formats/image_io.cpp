@@ -10,6 +10,8 @@
 #include <limits>
 
 #include "common/error.h"
+#include "segmentation/formats/dicom_file.h"
+#include "segmentation/formats/dicom_segmentation.h"
 #include "segmentation/formats/image_formats.h"
 
 namespace supine::segmentation {
@@ -33,8 +35,11 @@ RawImage read_by_extension(const std::filesystem::path& file) {
   if (name.ends_with(".mha") || name.ends_with(".mhd")) return formats::read_meta_image(file);
   if (name.ends_with(".nii") || name.ends_with(".nii.gz")) return formats::read_nifti(file);
   if (name.ends_with(".vti")) return formats::read_vti(file);
+  if (formats::is_dicom(file)) return formats::read_dicom_segmentation(file);
   throw InputError(
-      fmt::format("{}: unknown image format; known are .nrrd .nhdr .mha .mhd .nii .nii.gz .vti", file.string()));
+      fmt::format("{}: unknown image format; known are .nrrd .nhdr .mha .mhd .nii .nii.gz .vti, a DICOM segmentation, "
+                  "or the folder of a DICOM series",
+                  file.string()));
 }
 
 /// Splits the axis steps into spacing and direction, checked.

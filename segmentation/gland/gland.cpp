@@ -12,12 +12,12 @@ namespace supine::segmentation {
 namespace {
 
 constexpr double under_skin_mm = 8;  // below the rind: fat in every breast, but for the nipple
-constexpr double clear_of_noise = 4, pure_percentile = 0.95;
+constexpr double clear_of_noise = 4, pure_percentile = 0.98;
 constexpr std::size_t fewest_pure = 100;
 struct Range {
   double usual, lowest, highest;
 };
-constexpr Range dark_pure{0.65, 0.4, 0.85}, bright_pure{1.5, 0.5, 4};
+constexpr Range dark_pure{0.6, 0.5, 0.68}, bright_pure{1.5, 0.5, 4};
 
 /// Contrast of pure gland: near the upper end of what stands out of the noise.
 double pure_contrast(const FatLevel& fat, const Mask& inner, GlandOptions::Contrast contrast) {
@@ -75,10 +75,11 @@ GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const Gl
   result.aside_ml = volume_ml(looks, grid) - volume_ml(result.gland, grid);
   result.fraction.assign(inner.size(), 0);
   const Mask near = dilate(result.gland, grid, options.bridge_mm);
-  for (std::size_t n = 0; n < inner.size(); ++n)
-    if (near[n] && inner[n])
-      result.fraction[n] =
-          classes.probability[n] * std::clamp<float>(fat.contrast[n] / static_cast<float>(result.pure), 0, 1);
+  for (std::size_t n = 0; n < inner.size(); ++n) {
+    const float share = std::clamp<float>(fat.contrast[n] / static_cast<float>(result.pure), 0, 1);
+    if (near[n] && inner[n]) result.fraction[n] = classes.probability[n] * share;
+    result.gland[n] = result.gland[n] && share >= static_cast<float>(options.least_share);
+  }
   return result;
 }
 

@@ -21,6 +21,7 @@ struct GlandOptions {
   double fan_deg = 70;         ///< of a line from the nipple against the way to the chest; farther aside is axilla
   double bridge_mm = 4;        ///< gaps that connected gland may have; >= 0
   double least_ml = 0.3;       ///< smaller islands are not gland
+  double least_share = 0.35;   ///< of gland in a voxel that is labelled gland, 0 to below 1; 0 = any
   double failed_share = 1.6;   ///< bright: where fat is brighter than so many times its median, suppression failed
 };
 
@@ -52,6 +53,7 @@ struct GlandResult {
 /// 2. Classes with neighbourhood (classify_gland); the share of gland in each voxel is its contrast over that of pure
 ///    gland.
 /// 3. Place: not in skin, chest or failed suppression; inside the fan from the nipple to the chest; no small islands.
+/// 4. Labelled is what is gland by least_share or more, in pieces that hold together over voxels with less.
 /// @throws InputError  when the breast has too few voxels to fit
 GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const GlandOptions& options);
 

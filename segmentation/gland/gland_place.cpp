@@ -10,7 +10,7 @@ namespace {
 
 constexpr double tip_mm = 3;    // the nipple is the middle of what lies this near to the foremost voxel
 constexpr double apex_mm = 25;  // in front of the nipple: there the fan begins, so that it has some width at the nipple
-constexpr double near_nipple_mm = 45;  // ducts and gland come up to the skin there
+constexpr double near_nipple_mm = 28;  // ducts and gland come up to the skin there
 constexpr double least_depth_mm = 14,
                  least_deep_share = 0.5;  // so much of a piece lies so deep, unless it reaches the nipple
 

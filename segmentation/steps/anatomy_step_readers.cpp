@@ -48,6 +48,8 @@ Step read_chest(const StepTable& table) {
   o.coupling_per_mm = table.number("coupling_per_mm", not_negative).value_or(o.coupling_per_mm);
   o.far_weight = table.number("far_weight", not_negative).value_or(o.far_weight);
   o.oval_pull_per_mm = table.number("oval_pull_per_mm", not_negative).value_or(o.oval_pull_per_mm);
+  o.ahead_mm = table.number("ahead_mm", not_negative).value_or(o.ahead_mm);
+  o.ahead_cost_per_mm = table.number("ahead_cost_per_mm", not_negative).value_or(o.ahead_cost_per_mm);
   o.refine_mm = table.number("refine_mm", not_negative).value_or(o.refine_mm);
   return step;
 }
@@ -87,6 +89,7 @@ Step read_gland(const StepTable& table) {
   o.fan_deg = table.number("fan_deg", {.lower = 10, .upper = 180}).value_or(o.fan_deg);
   o.bridge_mm = table.number("bridge_mm", not_negative).value_or(o.bridge_mm);
   o.least_ml = table.number("least_ml", not_negative).value_or(o.least_ml);
+  o.least_share = table.number("least_share", {.lower = 0, .upper = 0.99}).value_or(o.least_share);
   o.failed_share = table.number("failed_share", {.lower = 1.1}).value_or(o.failed_share);
   return step;
 }

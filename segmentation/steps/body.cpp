@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "common/error.h"
+#include "segmentation/blur.h"
 #include "segmentation/steps/otsu.h"
 
 namespace supine::segmentation {
@@ -70,8 +71,11 @@ std::vector<float> local_maximum(const GreyImage& image, double radius_mm) {
 Mask find_air(const GreyImage& image, const Body& step, const Mask& dark) {
   const Grid& grid = image.grid;
   const float sure_level = step.air > 0 ? step.air : step.lower / 2;
+  // Single noisy voxels do not close a gap: what is air is seen on greys as blurred as gaps are wide.
+  std::vector<float> greys = image.voxels;
+  if (step.gap_mm > 0) gaussian_blur(greys, grid, step.gap_mm / 2);
   Mask sure(dark.size());
-  for (std::size_t n = 0; n < sure.size(); ++n) sure[n] = dark[n] && image.voxels[n] < sure_level;
+  for (std::size_t n = 0; n < sure.size(); ++n) sure[n] = greys[n] < sure_level;
   if (step.gap_mm > 0) sure = erode(sure, grid, step.gap_mm);
   sure = flood(sure, grid, front_face(grid));
   const std::vector<float> brightest = step.edge_share > 0 ? local_maximum(image, step.peel_mm) : std::vector<float>();

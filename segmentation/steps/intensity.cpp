@@ -148,7 +148,10 @@ std::vector<Sample> reselect(const GreyImage& image, const Polynomial& polynomia
   return samples;
 }
 
-void divide(GreyImage& image, const Polynomial& polynomial, const Eigen::VectorXd& coefficients, float level) {
+/// Divides by the fitted field, which is not let beyond what it is at the tissue's voxels (ln `low` to `high`): in the
+/// air far from them a polynomial runs away, and noise with it.
+void divide(GreyImage& image, const Polynomial& polynomial, const Eigen::VectorXd& coefficients, float level,
+            double low, double high) {
   const Grid& grid = image.grid;
 #pragma omp parallel
   {
@@ -159,7 +162,7 @@ void divide(GreyImage& image, const Polynomial& polynomial, const Eigen::VectorX
         for (int i = 0; i < grid.size.x(); ++i) {
           polynomial.evaluate(i, j, k, row);
           float& grey = image.at(i, j, k);
-          grey = static_cast<float>(level * grey / std::exp(row.dot(coefficients)));
+          grey = static_cast<float>(level * grey / std::exp(std::clamp(row.dot(coefficients), low, high)));
         }
   }
 }
@@ -230,7 +233,7 @@ BiasFit correct_bias(GreyImage& image, const Bias& step, const Mask& within) {
   result.residual_sd = std::sqrt(squares / static_cast<double>(result.voxels));
   result.lowest = std::exp(low - mean);
   result.highest = std::exp(high - mean);
-  divide(image, polynomial, coefficients, step.level);
+  divide(image, polynomial, coefficients, step.level, low, high);
   if (step.local_mm > 0) divide_local(image, samples, step);
   return result;
 }

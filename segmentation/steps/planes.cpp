@@ -96,7 +96,7 @@ std::vector<CutPlane> find_planes(const FrontSkin& front, const ChestWall& wall,
 }
 
 double half_turn_y_mm(const ChestWall& wall) {
-  constexpr Eigen::Index reach = 6;  // rays to either side that give the direction of the wall
+  constexpr Eigen::Index reach = 12;  // rays to either side that give its direction: the pectoral edge alone is steep
   std::vector<double> depths;
   for (Eigen::Index k = 0; k < wall.radius_mm.cols(); ++k)
     for (const double sign : {-1.0, 1.0})

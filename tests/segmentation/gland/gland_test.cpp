@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include "segmentation/gland/gland.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -93,6 +95,43 @@ TEST(GlandClasses, FindsTheShareOfGland) {
   double truth = 0;
   for (const auto gland : ball.truth) truth += gland;
   EXPECT_NEAR(classes.prior, truth / static_cast<double>(ball.truth.size()), 0.02);
+}
+
+/// A breast 90 mm across hanging from a chest, with a ball of gland, 30 % of it in a shell around the ball.
+TEST(Gland, LabelsWhatIsMostlyGlandAndKeepsTheShareOfTheRest) {
+  const Grid grid = cube(56, 2);
+  GreyImage image{grid, {}};
+  Mask body, breast, chest;
+  std::vector<float> share;
+  std::mt19937 random(11);
+  std::normal_distribution<float> noise(0, 2);
+  for (int k = 0; k < 56; ++k)
+    for (int j = 0; j < 56; ++j)
+      for (int i = 0; i < 56; ++i) {
+        const bool inside = std::hypot(i - 28, k - 28) < 23 && j > 4;
+        const double far = std::hypot(i - 28, j - 24, k - 28);
+        share.push_back(far < 5 ? 1.0f : far < 8 ? 0.2f : 0.0f);
+        body.push_back(inside);
+        chest.push_back(inside && j >= 48);
+        breast.push_back(inside && j < 48);
+        image.voxels.push_back((inside ? 100 - 60 * share.back() : 0) + noise(random));
+      }
+  GlandOptions options;
+  const GlandPlace place{body, breast, chest, -1, 40, 200};
+  const GlandResult result = find_gland(image, place, options);
+  double both = 0, sum = 0, core = 0, shell = 0, shell_voxels = 0;
+  for (std::size_t n = 0; n < share.size(); ++n) {
+    both += result.gland[n] && share[n] == 1;
+    sum += result.gland[n] + (share[n] == 1);
+    core += share[n] == 1;
+    shell += share[n] == 0.2f ? result.fraction[n] : 0;
+    shell_voxels += share[n] == 0.2f;
+  }
+  EXPECT_GT(2 * both / sum, 0.97);
+  EXPECT_NEAR(shell / shell_voxels, 0.2, 0.05);
+  options.least_share = 0;  // then what holds any gland is labelled
+  const GlandResult any = find_gland(image, place, options);
+  EXPECT_GT(std::count(any.gland.begin(), any.gland.end(), 1), 0.9 * (core + shell_voxels));
 }
 
 }  // namespace

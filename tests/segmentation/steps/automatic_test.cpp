@@ -157,6 +157,30 @@ TEST(AutomaticT1, ReadersEndTheBreastWhereTheChestTurnsAndBelowTheFold) {
   EXPECT_LT(at("inframammary_left"), -60);
 }
 
+TEST(AutomaticT1, DenseGlandIsNotTakenForTheChest) {
+  GreyImage image = torso(0);
+  for (std::size_t n = 0; n < image.voxels.size(); ++n) {
+    const Grid& grid = image.grid;
+    const int i = static_cast<int>(n % 132), j = static_cast<int>(n / 132 % 104), k = static_cast<int>(n / 132 / 104);
+    const Eigen::Vector3d p = grid.point(Eigen::Vector3d(i, j, k));
+    const double aside = std::hypot(std::abs(p.x()) - 75, p.z());
+    if (aside < 38 && std::abs(p.y() + 15) < 35) image.voxels[n] *= 0.38f;  // most of either breast
+  }
+  const auto worst = [&image](double cost_per_mm) {
+    Recipe steps = read_shipped_recipe("t1_auto");
+    for (Step& step : steps.steps)
+      if (auto* chest_step = std::get_if<Chest>(&step)) chest_step->options.ahead_cost_per_mm = cost_per_mm;
+    const ChestWall wall = run_recipe(image, steps).walls.at(0);
+    double most = 0;
+    for (Eigen::Index k = 2; k + 2 < wall.radius_mm.cols(); ++k)
+      for (Eigen::Index a = 40; a + 40 < wall.radius_mm.rows(); ++a)
+        most = std::max(most, (std::sqrt(chest(wall.point(a, k))) - 1) * half_depth);
+    return most;
+  };
+  EXPECT_LT(worst(ChestWallOptions().ahead_cost_per_mm), 6);
+  EXPECT_GT(worst(0), 15);
+}
+
 TEST(AutomaticT1, TheCasesSideHoldsWhereTheRecipeNamesNone) {
   Recipe left = read_shipped_recipe("t1_auto");
   left.set_side(Planes::Side::left);

@@ -63,6 +63,18 @@ TEST(Intensity, BiasOfItsOwnDegreeIsRemovedExactly) {
   EXPECT_NEAR(image.at(5, 5, 5), 300.0 / 7, 1e-3);
 }
 
+TEST(Intensity, BiasIsNotCarriedBeyondWhatTheTissueShows) {
+  GreyImage image = uniform(30, 5);  // air
+  for (int k = 0; k < 30; ++k)
+    for (int j = 0; j < 30; ++j)
+      for (int i = 0; i < 10; ++i)  // fat, darker from plane to plane
+        image.at(i, j, k) = static_cast<float>(900 * std::exp(-0.15 * i));
+  const float darkest_fat = image.at(9, 0, 0);
+  correct_bias(image, {{50, 1000}, 1, 100});
+  EXPECT_NEAR(image.at(9, 0, 0), 100, 1e-3);
+  EXPECT_NEAR(image.at(29, 0, 0), 100 * 5 / darkest_fat, 1e-3);  // carried on, the field would make it 20 times that
+}
+
 TEST(Intensity, BiasIgnoresOutliersOfAnotherTissue) {
   GreyImage image = uniform(14, 700);
   for (std::size_t n = 0; n < image.voxels.size(); n += 10) image.voxels[n] = 560;

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
+#include "segmentation/steps/body.h"
 #include "tests/segmentation/formats/image_files.h"
 
 namespace supine::segmentation {
@@ -138,6 +140,27 @@ TEST(RunRecipe, RefusesWhatCannotWorkAndNamesTheStep) {
   EXPECT_NE(message(Grow{"g", {{7, 0, 0}}, {0, 9}, {}, ""}).find("seed (7.0, 0.0, 0.0) mm lies outside the image"),
             std::string::npos);
   EXPECT_NE(message(Grow{"g", {{2, 0, 0}}, {0, 2}, {}, ""}).find("has grey 3, outside 0 to 2"), std::string::npos);
+}
+
+TEST(FindBody, SpecksOfNoiseDoNotCloseTheAir) {
+  GreyImage image;
+  image.grid.size = {40, 40, 20};
+  image.grid.spacing_mm = {1.5, 1.5, 3};
+  std::mt19937 random(4);
+  std::bernoulli_distribution speck(0.05);
+  for (int k = 0; k < 20; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 40; ++i) image.voxels.push_back(j >= 20 ? 100.0f : speck(random) ? 60.0f : 10.0f);
+  Body step;
+  step.lower = 50;
+  step.air = 34;
+  step.gap_mm = 4;
+  const Mask body = find_body(image, step);
+  for (int k = 0; k < 20; ++k)
+    for (int i = 0; i < 40; ++i) {
+      EXPECT_TRUE(body[image.grid.index(i, 21, k)]);
+      EXPECT_FALSE(body[image.grid.index(i, 8, k)]);
+    }
 }
 
 }  // namespace
