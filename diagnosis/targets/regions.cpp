@@ -128,7 +128,10 @@ TargetRegions told(const TargetQuestion& question, const Places& places, const C
     region.model_mm = places.there.row(p), region.place_mm = moved.row(p), region.outside_mm = outside[p];
     region.covariance = known.covariance.block<3, 3>(3 * p, 3 * p);
     const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(region.covariance);
-    region.half_axes_mm = reach * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
+    if (!(eigen.eigenvalues()[0] > 0))
+      throw NumericalFailure("the covariance of " + region.name +
+                             " is not positive: the shape in the pose is not the one that the scan was fitted with");
+    region.half_axes_mm = reach * eigen.eigenvalues().cwiseSqrt().reverse();
     region.axes = eigen.eigenvectors().rowwise().reverse();
     const Index near = count + p, over = 2 * count + p;
     const auto k = static_cast<std::size_t>(p);
@@ -171,9 +174,12 @@ JointMoves measured_part(calibration::Evaluator& evaluator, const BaseFit& base,
   joint.data.leftCols(all.size()) = all.columns;
   joint.mean.head(all.size()) = all.mean, joint.sd.head(all.size()) = all.sd;
   joint.y = base.distances(residuals);
-  joint.data_errors = base.errors, joint.data_kernel = base.kernel;
   joint.data_patches = base.clusters.means(
       patchiness_shapes(evaluator.chain(), at_data, base.fit.prediction, residuals, priors.patchiness));
+  // The fit took both where it began; distances and targets must be moved by the same ones.
+  joint.data_errors =
+      base.errors - base.patches * base.patches.transpose() + joint.data_patches * joint.data_patches.transpose();
+  joint.data_kernel = discrepancy.kernel;
   const LinearEvidence evidence(*base.covariance, joint.y, all);
   std::vector<int> every(static_cast<std::size_t>(all.size()));
   std::iota(every.begin(), every.end(), 0);

@@ -140,9 +140,21 @@ class TargetsTool : public Tool {
       const TargetQuestion question =
           question_of(measured->description, measured->mesh, measured->anatomy, targets, pose);
       const TargetRegions regions = diagnosis::find_regions(question, evaluator, base, options.priors);
+      warn_of_unsettled(run, regions);
       write(run, question, regions, *base.parameters, &base.fit.prediction.solution);
     }
     return left_out_ ? Outcome::target_not_met : Outcome::done;
+  }
+
+  /// A fit that stopped on its way has its optimum elsewhere, where derivatives may be others.
+  static void warn_of_unsettled(Run& run, const TargetRegions& regions) {
+    constexpr double settled = 0.2;  // of a coordinate, about a fifth of a modulus
+    const double off = regions.parameters.mean.head(regions.parameters.u.size()).cwiseAbs().maxCoeff();
+    if (off > settled)
+      run.warn(
+          fmt::format("the fit has not settled: a parameter would go on by {:.2g} of its logarithm. Regions are to "
+                      "first order from where it stopped; start nearer with --model",
+                      off));
   }
 
   Outcome by_priors(Run& run, const Case& description) {
