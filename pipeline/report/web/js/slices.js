@@ -44,7 +44,7 @@
         });
         this.draw();
       });
-      return { plane, canvas, over, node: el("div", { class: "slice" }, el("p", { class: "title" }, plane.name), el("div", { class: "slice-picture" }, canvas, over)) };
+      return { plane, canvas, over, node: el("div", { class: "slice", style: `flex: ${size[plane.across]} 1 0` }, el("p", { class: "title" }, plane.name), el("div", { class: "slice-picture" }, canvas, over)) };
     }
 
     inside(axis, index) { return Math.min(Math.max(index, 0), this.volume.size[axis] - 1); }
