@@ -27,6 +27,7 @@ struct TargetRegion {
   std::string name;
   Eigen::Vector3d model_mm;                ///< where the model has it
   Eigen::Vector3d place_mm;                ///< the best guess with all that is known: centre of the ellipsoid
+  Eigen::Vector3d finer_mm;                ///< what finer elements would move it by
   Eigen::Matrix3d covariance;              ///< mm²
   Eigen::Vector3d half_axes_mm;            ///< of the 95 % ellipsoid, longest first
   Eigen::Matrix3d axes;                    ///< its directions, columns

@@ -40,6 +40,7 @@ Json point_json(const TargetRegion& region) {
   return {{"name", region.name},
           {"place_mm", vector_json(region.place_mm)},
           {"model_mm", vector_json(region.model_mm)},
+          {"finer_mm", vector_json(region.finer_mm)},
           {"sigma_mm", region.sd_mm()},
           {"covariance_mm2", matrix_json(region.covariance)},
           {"half_axes_mm", vector_json(region.half_axes_mm)},

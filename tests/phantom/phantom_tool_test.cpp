@@ -2,6 +2,7 @@
 // supine-phantom as a program: same bytes, nothing told, bad input; and a null that is calibrated back to its truth.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "phantom/causes/cause.h"
