@@ -129,9 +129,9 @@ TEST(PhantomTool, PopulationIsSaidInTheAnswer) {
   for (std::size_t i = 0; i < 20; ++i) {
     double square = 0;
     for (std::size_t axis = 0; axis < 3; ++axis)
-      square += std::pow(answer["targets"][i]["supine_mm"][axis].get<double>() -
-                             answer["targets"][i]["prone_mm"][axis].get<double>(),
-                         2);
+      square += std::pow(
+          answer["targets"][i]["supine_mm"][axis].get<double>() - answer["targets"][i]["prone_mm"][axis].get<double>(),
+          2);
     EXPECT_NEAR(std::sqrt(square), answer["motion"]["inside"][i]["moved_mm"].get<double>(), 1e-9) << i;
   }
 }
