@@ -3,7 +3,7 @@
 #   make demo                        install what is missing, build, take the sample from its MRI to the report
 #   make test [DATA=dir]             the same set-up, then every test; DATA: docs/data.md
 #   make CASE=dir [OUT=dir] [stage]  run a case: segment reconstruct decimate mesh simulate compare, or as far as its data allow;
-#                                    then calibrate, diagnose, ladder, sensitivity, warp; report: one page of what is there
+#                                    then calibrate, diagnose, ladder, sensitivity, targets, warp; report: one page of what is there
 #   make COHORT=dir [TARGET=stage] [OUT=dir] [PROFILE=cohort/slurm]
 #                                    the same for every case in the folder; with PROFILE through Snakemake: cohort/README.md
 #   make style                       whether every source file is as clang-format 14 writes it; make format writes it
@@ -22,7 +22,7 @@ DEVELOPER ?= OFF
 # One compiler per core, as far as 1.5 GB of free memory for each allow: heavy templates.
 JOBS ?= $(shell awk -v cores=$$(nproc) '/^MemAvailable/ { m = int($$2 / 1572864); n = m < cores ? m : cores; print n < 1 ? 1 : n }' /proc/meminfo)
 
-stages := segment reconstruct decimate mesh simulate register compare calibrate diagnose ladder sensitivity draws warp report summary
+stages := segment reconstruct decimate mesh simulate register compare calibrate diagnose ladder sensitivity draws targets warp report summary
 run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 
 # Data that the repository does not hold: docs/data.md.

@@ -64,7 +64,9 @@ Landmarks read_landmarks(const std::filesystem::path& file, const std::string& f
   const std::vector<std::string> plain = {"name", "x", "y", "z"}, with_sigma = {"name", "x", "y", "z", "sigma_mm"};
   std::vector<std::string> header;
   if (std::getline(stream, line)) header = split(line);
-  if (header != plain && header != with_sigma)
+  const bool states_sigma =
+      header.size() >= with_sigma.size() && std::equal(with_sigma.begin(), with_sigma.end(), header.begin());
+  if (header != plain && !states_sigma)
     throw InputError(file.string() + ":1: the header must be name,x,y,z or name,x,y,z,sigma_mm");
 
   Landmarks landmarks;
@@ -83,7 +85,7 @@ Landmarks read_landmarks(const std::filesystem::path& file, const std::string& f
       throw InputError(fmt::format("{}: landmark '{}' stands twice; each name once", place, fields[0]));
     landmarks.names.push_back(fields[0]);
     points.emplace_back(coordinate(fields[1], place), coordinate(fields[2], place), coordinate(fields[3], place));
-    if (header == with_sigma) sigmas.push_back(sigma(fields[4], place));
+    if (states_sigma) sigmas.push_back(sigma(fields[4], place));
     if (frame == "RAS") points.back().head<2>() *= -1;
   }
   if (points.empty())

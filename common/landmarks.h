@@ -21,7 +21,7 @@ struct Landmarks {
 };
 
 /// Reads a CSV file with the header `name,x,y,z` or `name,x,y,z,sigma_mm`, mm, in @p frame (LPS or RAS; converted to
-/// LPS).
+/// LPS). Columns behind sigma_mm (regions of supine-targets) are not read.
 /// @throws InputError  naming file and line: wrong header, more or fewer fields than it has, not a number, a sigma_mm
 ///   that is not > 0, a name twice
 Landmarks read_landmarks(const std::filesystem::path& file, const std::string& frame = "LPS");

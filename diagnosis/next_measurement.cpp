@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "calibration/model_skin.h"
 #include "calibration/scan_motion.h"
 #include "common/error.h"
 #include "common/rms.h"
+#include "diagnosis/further_poses.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
@@ -44,19 +44,13 @@ std::vector<Option> options_of_object(const Subject& subject) {
 /// From the gravity of the fitted pose and the patient's own directions (LPS: +z is the head).
 std::vector<Option> options_of(const Subject& subject) {
   if (subject.scene.anatomy->is_object()) return options_of_object(subject);
-  const Eigen::Vector3d down = subject.scene.measurements[0]->pose.gravity, feet(0, 0, -1);
-  const auto tilted = [&down](double degrees, const Eigen::Vector3d& to) -> Eigen::Vector3d {
-    const double a = degrees * std::numbers::pi / 180;
-    return (std::cos(a) * down + std::sin(a) * to).normalized();
-  };
-  const Eigen::Vector3d& lateral = subject.scene.anatomy->lateral;
-  const std::string side = lateral.x() > 0 ? "left" : "right";
+  const Eigen::Vector3d& down = subject.scene.measurements[0]->pose.gravity;
   const bool several = subject.scene.measurements.size() > 1;
   const std::string again = several ? "all that was fitted" : subject.scene.measurements[0]->pose.name;
-  return {{again + ", once more", down, true},
-          {"tilted 45 degrees, head up", tilted(45, feet)},
-          {"tilted 45 degrees to the patient's " + side, tilted(45, lateral)},
-          {"upright", feet}};
+  std::vector<Option> options = {{again + ", once more", down, true}};
+  for (const FurtherPose& pose : further_poses(down, subject.scene.anatomy->lateral))
+    options.push_back({pose.name, pose.down});
+  return options;
 }
 
 /// Whitened slopes of what is free in the base model and of some effects, at one measurement.

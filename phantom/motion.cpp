@@ -27,12 +27,13 @@ Eigen::Vector3d place_in_mound(const Body& body, Random& random) {
   }
 }
 
-/// Row 0 the nipple, then the places; stress-free, LPS mm.
+/// Row 0 the nipple, then the places, then the tumour; stress-free, LPS mm.
 Points marked_points(const Body& body, std::uint64_t seed) {
   Random random(seed, "motion");
-  Points points(1 + places, 3);
+  Points points(2 + places, 3);
   points.row(0) = body.world(body.place(Eigen::Vector2d::Zero(), 1)).transpose();
   for (int i = 1; i <= places; ++i) points.row(i) = body.world(place_in_mound(body, random)).transpose();
+  points.row(1 + places) = body.world(body.tumour_centre).transpose();
   return points;
 }
 
@@ -49,7 +50,7 @@ Motion measure_motion(const BodyMesh& body_mesh, const Body& body, const Points&
   Motion motion;
   const double outer = body.side == "left" ? 1 : -1;
   motion.nipple_mm = moved.row(0).transpose().cwiseProduct(Eigen::Vector3d(outer, 1, 1));
-  for (Eigen::Index i = 1; i < moved.rows(); ++i) {
+  for (Eigen::Index i = 1; i <= places; ++i) {
     InnerPlace place{moved.row(i).norm(), (moved.row(i) - moved.row(0)).norm(), {}, {}};
     for (int pose = 0; pose < 2; ++pose) {
       const Eigen::Vector3d at = marks[pose].row(i).transpose();
@@ -58,6 +59,7 @@ Motion measure_motion(const BodyMesh& body_mesh, const Body& body, const Points&
     }
     motion.inside.push_back(place);
   }
+  motion.prone = marks[0].bottomRows(1 + places), motion.supine = marks[1].bottomRows(1 + places);
   return motion;
 }
 

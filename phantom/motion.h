@@ -21,6 +21,7 @@ struct InnerPlace {
 struct Motion {
   Eigen::Vector3d nipple_mm;  ///< toward the outer side, back, head
   std::vector<InnerPlace> inside;
+  Points prone, supine;  ///< #inside + 1 by 3, LPS mm: those places, then the middle of the tumour
 };
 
 /// @param prone, supine  nodes, LPS mm

@@ -85,10 +85,10 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
   const VectorXd variance = base.clusters.means(base.noise_of_point_mm.cwiseAbs2());
   base.errors = variance.cwiseQuotient(base.clusters.members).asDiagonal();
   add_shared(base, priors, base.clusters.means(noise.shared_mm), base.errors);
-  const MatrixXd patches = base.clusters.means(
+  base.patches = base.clusters.means(
       patchiness_shapes(evaluator.chain(), sensitivities, base.fit.prediction, residuals, priors.patchiness));
-  base.errors += patches * patches.transpose();
-  base.patchiness_mm = std::sqrt(patches.squaredNorm() / static_cast<double>(patches.rows()));
+  base.errors += base.patches * base.patches.transpose();
+  base.patchiness_mm = std::sqrt(base.patches.squaredNorm() / static_cast<double>(base.patches.rows()));
   base.mean_mm = VectorXd::Zero(residuals.size());
   if (base.numerical) {
     base.mean_mm = base.numerical->finer_mm;

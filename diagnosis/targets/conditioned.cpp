@@ -80,8 +80,13 @@ ConditionedTargets condition(const JointMoves& m) {
   }
   mean /= whole;
   const MatrixXd covariance = second / whole - mean * mean.transpose();
-  return {mean.head(t), covariance.topLeftCorner(t, t), covariance.topRightCorner(t, z),
-          covariance.bottomRightCorner(z, z).diagonal()};
+  return {mean.head(t), covariance.topLeftCorner(t, t), covariance.topRightCorner(t, z), mean.tail(z),
+          covariance.bottomRightCorner(z, z)};
+}
+
+MatrixXd covariance_after(const JointMoves& m, double size_mm) {
+  const Index t = m.targets.rows();
+  return after(m, size_mm).covariance.topLeftCorner(t, t);
 }
 
 Surprise surprise_of(const JointMoves& m, const std::vector<int>& rows) {
@@ -115,7 +120,7 @@ Surprise surprise_of(const JointMoves& m, const std::vector<int>& rows) {
   }
   mean /= whole;
   const MatrixXd covariance = second / whole - mean * mean.transpose();
-  Surprise surprise{covariance.diagonal().cwiseSqrt(), m.y(rows) - mean};
+  Surprise surprise{covariance.diagonal().cwiseSqrt(), m.y(rows) - mean, covariance};
   surprise.square = surprise.less_expected.dot(factorised(covariance).solve(surprise.less_expected));
   surprise.p_value = chi_squared_above(static_cast<int>(n), surprise.square);
   return surprise;

@@ -25,11 +25,15 @@ struct JointMoves {
 
 /// What is known of the targets after the measurement, over all sizes s.
 struct ConditionedTargets {
-  Eigen::VectorXd mean;                ///< #t, of t
-  Eigen::MatrixXd covariance;          ///< #t by #t
-  Eigen::MatrixXd with_directions;     ///< covariance of t with θ, #t by #z
-  Eigen::VectorXd direction_variance;  ///< of θ, #z
+  Eigen::VectorXd mean;                   ///< #t, of t
+  Eigen::MatrixXd covariance;             ///< #t by #t
+  Eigen::MatrixXd with_directions;        ///< covariance of t with θ, #t by #z
+  Eigen::VectorXd directions_mean;        ///< of θ, #z
+  Eigen::MatrixXd directions_covariance;  ///< of θ, #z by #z
 };
+
+/// Covariance of t at one size s, as it will be after the measurement: no y is needed.
+Eigen::MatrixXd covariance_after(const JointMoves& moves, double size_mm);
 
 /// Exact conditioning for every s, then mean and covariance of the mixture.
 /// @throws NumericalFailure  the covariance of the distances is not positive
@@ -40,6 +44,7 @@ ConditionedTargets condition(const JointMoves& moves);
 struct Surprise {
   Eigen::VectorXd expected_sd_mm;  ///< of each of @p rows
   Eigen::VectorXd less_expected;   ///< e − μ
+  Eigen::MatrixXd covariance;      ///< of e − μ
   double square = 0;
   double p_value = 1;  ///< of a χ² with as many degrees as rows
 };

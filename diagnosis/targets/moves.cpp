@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/targets/moves.h"
 
+#include <cmath>
+
 #include "diagnosis/evidence/patchiness.h"
+#include "diagnosis/numerical_error.h"
+#include "diagnosis/weighted_fit.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -18,7 +22,33 @@ Eigen::MatrixXd patches_of(const PoseAt& at, const simulation::Embedding& points
   return all;
 }
 
+/// The solution with one pose, that of @p name or else the first, by that name.
+simulation::ChainSolution beginning_of(simulation::ChainSolution near, const std::string& name) {
+  std::size_t row = 0;
+  for (std::size_t p = 0; p < near.poses.size(); ++p)
+    if (near.poses[p].name == name) row = p;
+  near.poses = {near.poses[row]};
+  near.poses[0].name = name;
+  return near;
+}
+
+simulation::ChainSolution solved(simulation::Chain& chain, const simulation::Model& model,
+                                 const simulation::ChainSolution* near) {
+  if (near == nullptr) return chain.solve(model);
+  const simulation::ChainSolution start = beginning_of(*near, chain.poses()[1].name);
+  return chain.solve(model, &start);
+}
+
 }  // namespace
+
+PoseAt::PoseAt(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const simulation::PoseLoad& imaged,
+               const simulation::PoseLoad& pose, const simulation::Model& model_, const simulation::ChainSolution* near)
+    : model(model_),
+      chain(mesh, anatomy, model, {imaged, pose}, accurate_enough()),
+      solution(solved(chain, model, near)),
+      sensitivities(chain, model, solution) {}
+
+double PoseAt::way_mm() const { return diagnosis::way_mm(solution); }
 
 PointMoves moves_of(const PoseAt& at, const simulation::Embedding& points, const calibration::FreeParameters& free,
                     const Eigen::VectorXd& u, const std::vector<Nuisance>& nuisances, const Patchiness& patchiness,

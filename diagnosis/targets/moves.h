@@ -3,6 +3,7 @@
 
 #include "calibration/free_parameters.h"
 #include "diagnosis/evidence/nuisances.h"
+#include "meshing/anatomy.h"
 #include "simulation/embedding.h"
 #include "simulation/solve/sensitivities.h"
 
@@ -18,9 +19,16 @@ struct PointMoves {
 
 /// A solved chain of two poses, the imaged one and the one asked for, at a model.
 struct PoseAt {
-  simulation::Chain& chain;
-  const simulation::Sensitivities& sensitivities;
-  const simulation::Model& model;
+  /// @param near  of the imaged pose and others, to start from, or nullptr
+  /// @throws NumericalFailure  no equilibrium
+  PoseAt(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const simulation::PoseLoad& imaged,
+         const simulation::PoseLoad& pose, const simulation::Model& model_, const simulation::ChainSolution* near);
+  simulation::Model model;
+  simulation::Chain chain;
+  simulation::ChainSolution solution;
+  simulation::Sensitivities sensitivities;
+  const Points& x() const { return solution.poses[0].x; }
+  double way_mm() const;  ///< from the imaged pose, rms over the nodes
 };
 
 /// @param u       coordinates of the free parameters in the model

@@ -7,12 +7,14 @@
 #include <numeric>
 
 #include "calibration/model_skin.h"
+#include "common/error.h"
 #include "common/statistics.h"
 #include "diagnosis/evidence/discrepancy.h"
 #include "diagnosis/evidence/field_modes.h"
-#include "diagnosis/targets/moves.h"
-#include "diagnosis/weighted_fit.h"
-#include "simulation/parameters.h"
+#include "diagnosis/further_poses.h"
+#include "diagnosis/targets/further_scan.h"
+#include "diagnosis/targets/places.h"
+#include "meshing/topology.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -31,85 +33,12 @@ constexpr double marker_mm = 1.5;  // of a marker's place, each axis; as of land
 constexpr std::size_t most_told = 6;
 constexpr double open_sd = 3;  // coordinates of a parameter without prior, as in directions_at()
 
-/// One solved chain of the imaged pose and the one asked for.
-struct Solved {
-  Solved(const TargetQuestion& question, const simulation::Model& model_, const simulation::ChainSolution* near)
-      : model(model_),
-        chain(*question.mesh, *question.anatomy, model, {question.prone, question.pose}, accurate_enough()),
-        solution(chain.solve(model, near)),
-        sensitivities(chain, model, solution) {}
-  simulation::Model model;
-  simulation::Chain chain;
-  simulation::ChainSolution solution;
-  simulation::Sensitivities sensitivities;
-  const Points& x() const { return solution.poses[0].x; }
-};
-
-/// The points asked for, then of each the skin that is nearest, then the skin over it against gravity (or the nearest).
-struct Places {
-  Points imaged, there;  // 3 #P rows
-  std::vector<Vector3d> normal, straight_normal;
-  std::vector<bool> has_straight;
-};
-
-/// Where the line from @p from along @p way leaves the skin last.
-std::optional<std::pair<Index, Vector3d>> last_crossing(const calibration::SurfaceDistance& skin, const Vector3d& from,
-                                                        const Vector3d& way) {
-  std::optional<std::pair<Index, Vector3d>> found;
-  double furthest = 0;
-  for (Index t = 0; t < skin.triangles().rows(); ++t) {
-    const Vector3d a = skin.points().row(skin.triangles()(t, 0)), b = skin.points().row(skin.triangles()(t, 1)),
-                   c = skin.points().row(skin.triangles()(t, 2));
-    Matrix3d system;
-    system << b - a, c - a, -way;
-    const Vector3d s = system.fullPivLu().solve(from - a);
-    if (!s.allFinite() || s[0] < -1e-9 || s[1] < -1e-9 || s[0] + s[1] > 1 + 1e-9 || s[2] <= furthest) continue;
-    furthest = s[2];
-    found = {t, Vector3d(1 - s[0] - s[1], s[0], s[1])};
-  }
-  return found;
-}
-
-Places places_of(const TargetQuestion& question, const Points& x) {
-  const Index count = question.imaged.rows();
-  const calibration::ModelSkin skin(*question.mesh, x);
-  const auto& surface = skin.distance();
-  Places places{Points(3 * count, 3), Points(3 * count, 3), {}, {}, {}};
-  const Points there = simulation::Embedding(*question.mesh, question.imaged).at(x);
-  calibration::ClosestPoints closest;
-  surface.closest(there, closest);
-  for (Index p = 0; p < count; ++p) {
-    const auto set = [&](Index row, const auto& nodes, const Vector3d& weight) {
-      places.imaged.row(row).setZero(), places.there.row(row).setZero();
-      for (int a = 0; a < 3; ++a) {
-        places.imaged.row(row) += weight[a] * question.mesh->points.row(nodes[a]);
-        places.there.row(row) += weight[a] * x.row(nodes[a]);
-      }
-    };
-    places.imaged.row(p) = question.imaged.row(p), places.there.row(p) = there.row(p);
-    set(count + p, closest.node.row(p), closest.weight.row(p).transpose());
-    places.normal.push_back(closest.normal.row(p).transpose());
-    const auto over = last_crossing(surface, there.row(p).transpose(), -question.pose.gravity);
-    places.has_straight.push_back(over.has_value());
-    if (!over) {
-      set(2 * count + p, closest.node.row(p), closest.weight.row(p).transpose());
-      places.straight_normal.push_back(places.normal.back());
-      continue;
-    }
-    const auto nodes = surface.triangles().row(over->first);
-    set(2 * count + p, nodes, over->second);
-    const Vector3d a = x.row(nodes[0]), b = x.row(nodes[1]), c = x.row(nodes[2]);
-    places.straight_normal.push_back((b - a).cross(c - a).normalized());
-  }
-  return places;
-}
-
 /// Nuisances of the pose that no measured pose has.
 std::vector<Nuisance> with_those_of(const simulation::Model& model, std::vector<Nuisance> known,
-                                    const std::string& pose, const Priors& priors) {
+                                    const std::string& imaged, const std::string& pose, const Priors& priors) {
   for (const Nuisance& nuisance : known)
     if (nuisance.pose == pose) return known;
-  for (Nuisance& nuisance : nuisances_of(model, {pose}, priors))
+  for (Nuisance& nuisance : nuisances_of(model, {imaged, pose}, priors))
     if (nuisance.pose == pose) known.push_back(std::move(nuisance));
   return known;
 }
@@ -160,16 +89,20 @@ std::vector<Shrink> shrinks_of(const ConditionedTargets& known, const std::vecto
   std::vector<Shrink> all;
   for (std::size_t k = 0; k < names.size(); ++k) {
     const auto column = static_cast<Index>(k);
-    if (known.direction_variance[column] <= 0) continue;
+    const double variance = known.directions_covariance(column, column);
+    if (variance <= 0) continue;
     const Vector3d cross = known.with_directions.col(column).segment<3>(row);
-    all.push_back({names[k], cross.squaredNorm() / known.direction_variance[column] / own.trace()});
+    all.push_back({names[k], cross.squaredNorm() / variance / own.trace()});
   }
   const Matrix3d marker =
       known.covariance.block<3, 3>(skin_row, skin_row) + marker_mm * marker_mm * Matrix3d::Identity();
   all.push_back({"marker on the nearest skin", gone(known.covariance.block<3, 3>(row, skin_row), marker, own)});
+  return all;
+}
+
+void keep_most(std::vector<Shrink>& all) {
   std::stable_sort(all.begin(), all.end(), [](const Shrink& a, const Shrink& b) { return a.share > b.share; });
   all.resize(std::min(all.size(), most_told));
-  return all;
 }
 
 /// Six rows of two points.
@@ -188,13 +121,18 @@ TargetRegions told(const TargetQuestion& question, const Places& places, const C
   const double reach = std::sqrt(chi_squared_quantile(3, 0.95));
   TargetRegions regions;
   regions.covariance = known.covariance.topLeftCorner(3 * count, 3 * count);
+  regions.parameters.mean = known.directions_mean, regions.parameters.covariance = known.directions_covariance;
   for (Index p = 0; p < count; ++p) {
     TargetRegion region;
     region.name = question.names[static_cast<std::size_t>(p)];
     region.model_mm = places.there.row(p), region.place_mm = moved.row(p), region.outside_mm = outside[p];
+    region.finer_mm.setZero();
     region.covariance = known.covariance.block<3, 3>(3 * p, 3 * p);
     const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(region.covariance);
-    region.half_axes_mm = reach * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
+    if (!(eigen.eigenvalues()[0] > 0))
+      throw NumericalFailure("the covariance of " + region.name +
+                             " is not positive: the shape in the pose is not the one that the scan was fitted with");
+    region.half_axes_mm = reach * eigen.eigenvalues().cwiseSqrt().reverse();
     region.axes = eigen.eigenvectors().rowwise().reverse();
     const Index near = count + p, over = 2 * count + p;
     const auto k = static_cast<std::size_t>(p);
@@ -207,11 +145,6 @@ TargetRegions told(const TargetQuestion& question, const Places& places, const C
     regions.points.push_back(std::move(region));
   }
   return regions;
-}
-
-double way_of(const Solved& solved) {
-  const Points way = solved.x() - solved.solution.prone;
-  return std::sqrt(way.squaredNorm() / static_cast<double>(way.rows()));
 }
 
 /// Rows of the clusters that are landmarks of one pose.
@@ -242,9 +175,12 @@ JointMoves measured_part(calibration::Evaluator& evaluator, const BaseFit& base,
   joint.data.leftCols(all.size()) = all.columns;
   joint.mean.head(all.size()) = all.mean, joint.sd.head(all.size()) = all.sd;
   joint.y = base.distances(residuals);
-  joint.data_errors = base.errors, joint.data_kernel = base.kernel;
   joint.data_patches = base.clusters.means(
       patchiness_shapes(evaluator.chain(), at_data, base.fit.prediction, residuals, priors.patchiness));
+  // The fit took both where it began; distances and targets must be moved by the same ones.
+  joint.data_errors =
+      base.errors - base.patches * base.patches.transpose() + joint.data_patches * joint.data_patches.transpose();
+  joint.data_kernel = discrepancy.kernel;
   const LinearEvidence evidence(*base.covariance, joint.y, all);
   std::vector<int> every(static_cast<std::size_t>(all.size()));
   std::iota(every.begin(), every.end(), 0);
@@ -258,36 +194,128 @@ std::vector<std::string> names_of(const FreeParameters& free, const std::vector<
   return names;
 }
 
+/// What finer elements move the places by, as far as that was measured; zero else. Most of it is a slide along the
+/// muscle that the scan hardly shows, and it did not bring places nearer to the truth (docs/verification.md): an error
+/// of all places together, no correction.
+VectorXd moved_by_finer_elements(const TargetQuestion& question, const Places& places, const BaseFit& base) {
+  VectorXd moved = VectorXd::Zero(places.imaged.size());
+  if (!base.numerical || !base.numerical->finer_failure.empty()) return moved;
+  const NumericalError& error = *base.numerical;
+  for (std::size_t p = 0; p < error.quadratic.poses.size(); ++p) {
+    if (error.quadratic.poses[p].name != question.pose.name) continue;
+    const meshing::TetMesh& mesh = error.coarse ? *error.coarse : *question.mesh;
+    const double ratio =
+        std::cbrt(static_cast<double>(mesh.cells.rows()) / static_cast<double>(question.mesh->cells.rows()));
+    const Points l = simulation::Embedding(mesh, places.imaged).at(error.linear.poses[p].x);
+    const Points q = simulation::Embedding(meshing::to_quadratic(mesh), places.imaged).at(error.quadratic.poses[p].x);
+    const Points change = ratio * (q - l);
+    moved = Eigen::Map<const VectorXd>(change.data(), change.size());
+  }
+  return moved;
+}
+
+/// Landmarks err together where they lie close to each other and to a target (discrepancy.h).
+void add_beyond_forces_of_landmarks(const calibration::Clusters& clusters, int pose, const Points& targets,
+                                    MatrixXd& cross) {
+  for (const int row : landmark_rows(clusters, pose)) {
+    const int axis = clusters.kind[row] - 1;
+    const MatrixXd alike = gaussian_kernel(targets, clusters.place.row(row), beyond_forces_length_mm);
+    for (Index i = 0; i < targets.rows(); ++i) cross(3 * i + axis, row) -= share_beyond_forces * alike(i, 0);
+  }
+}
+
+ExpectedLandmarks expected_landmarks(const JointMoves& joint, const std::vector<int>& rows,
+                                     const calibration::MeasuredLandmarks& measured) {
+  const Surprise surprise = surprise_of(joint, rows);
+  ExpectedLandmarks expected{measured.names, measured.measured, surprise.covariance, surprise.square, surprise.p_value};
+  for (Index i = 0; i < expected.expected.rows(); ++i)
+    expected.expected.row(i) -= surprise.less_expected.segment<3>(3 * i).transpose();
+  return expected;
+}
+
+/// What is needed to weigh a scan that was not made.
+struct Weighing {
+  const JointMoves& joint;
+  const BaseFit& base;
+  const std::vector<Nuisance>& nuisances;
+  const Priors& priors;
+  const std::vector<VectorXd>& forces;
+  const MatrixXd &data_forces, &target_forces;
+};
+
+void add_further_scans(const TargetQuestion& question, const Weighing& with, TargetRegions& regions) {
+  const MatrixXd now = covariance_after(with.joint, with.base.size_mm);
+  for (const FurtherPose& pose : further_poses(question.pose.gravity, question.anatomy->lateral)) try {
+      PoseAt at(*question.mesh, *question.anatomy, question.prone, {pose.name, pose.down}, with.base.model,
+                &with.base.fit.prediction.solution);
+      const FurtherScan scan = further_scan(at, *question.mesh, *with.base.parameters, with.base.fit.u, with.nuisances,
+                                            with.priors, with.forces, mesh_share_of_way);
+      const MatrixXd then = covariance_after(with_further_scan(with.joint, scan, with.data_forces, with.target_forces),
+                                             with.base.size_mm);
+      for (std::size_t p = 0; p < regions.points.size(); ++p) {
+        const auto row = 3 * static_cast<Index>(p);
+        const double before = now.block<3, 3>(row, row).trace(), after = then.block<3, 3>(row, row).trace();
+        regions.points[p].shrinks.push_back({"scan " + pose.name, 1 - after / before});
+      }
+    } catch (const NumericalFailure&) {
+      // No equilibrium in that pose: nothing can be promised.
+    }
+}
+
+/// Forces scaled to a mean square of 1 mm² along the normal of the skin, as over the clusters of a scan.
+void scale_forces(const PoseAt& at, const meshing::TetMesh& mesh, const std::vector<VectorXd>& forces,
+                  MatrixXd& moves) {
+  const calibration::ModelSkin skin(mesh, at.x());
+  const Points normals = skin.node_normals();
+  double square = 0;
+  for (const VectorXd& force : forces) {
+    const Points moved = at.sensitivities.moved_by(0, force);
+    for (std::size_t k = 0; k < skin.nodes().size(); ++k)
+      square += std::pow(moved.row(skin.nodes()[k]).dot(normals.row(static_cast<Index>(k))), 2);
+  }
+  moves *= std::sqrt((1 - share_beyond_forces) * static_cast<double>(skin.nodes().size()) / square);
+}
+
 }  // namespace
 
 double TargetRegion::sd_mm() const { return std::sqrt(covariance.trace() / 3); }
 
 TargetRegions find_regions(const TargetQuestion& question, calibration::Evaluator& evaluator, const BaseFit& base,
                            const Priors& priors) {
-  const auto nuisances = with_those_of(base.model, base.nuisances, question.pose.name, priors);
+  const auto nuisances = with_those_of(base.model, base.nuisances, question.prone.name, question.pose.name, priors);
   Discrepancy discrepancy;
   JointMoves joint = measured_part(evaluator, base, priors, nuisances, discrepancy);
-  Solved solved(question, base.model, nullptr);
-  const Places places = places_of(question, solved.x());
+  PoseAt at(*question.mesh, *question.anatomy, question.prone, question.pose, base.model,
+            &base.fit.prediction.solution);
+  Places places = places_of(*question.mesh, question.imaged, at.x(), -question.pose.gravity);
   const simulation::Embedding points(*question.mesh, places.imaged);
-  const PointMoves moves = moves_of({solved.chain, solved.sensitivities, solved.model}, points, *base.parameters,
-                                    base.fit.u, nuisances, priors.patchiness, discrepancy.forces);
+  const PointMoves moves =
+      moves_of(at, points, *base.parameters, base.fit.u, nuisances, priors.patchiness, discrepancy.forces);
   fill_targets(joint, moves, places.there);
   const int row = row_of_pose(evaluator.scene(), question.pose.name);
   MatrixXd columns = discrepancy.columns;
   for (Index i = 0; i < columns.rows(); ++i)
     if (base.clusters.pose[i] != row) columns.row(i) *= common_to_poses;
   joint.cross_kernel = moves.forces * columns.transpose();
-  const double mesh = base.numerical ? base.numerical->spread_mm : mesh_share_of_way * way_of(solved);
+  if (row >= 0) add_beyond_forces_of_landmarks(base.clusters, row, places.there, joint.cross_kernel);
+  const double mesh = base.numerical ? base.numerical->spread_mm : mesh_share_of_way * at.way_mm();
   const double length = base.numerical ? std::max(5.0, base.numerical->length_mm) : beyond_forces_length_mm;
-  joint.target_errors = mesh_errors(places.there, mesh, length);
-  TargetRegions regions = told(question, places, condition(joint), names_of(*base.parameters, nuisances));
+  const VectorXd finer = moved_by_finer_elements(question, places, base);
+  joint.target_errors = mesh_errors(places.there, mesh, length) + finer * finer.transpose();
+  const ConditionedTargets known = condition(joint);
+  TargetRegions regions = told(question, places, known, names_of(*base.parameters, nuisances));
+  for (std::size_t p = 0; p < regions.points.size(); ++p)
+    regions.points[p].finer_mm = finer.segment<3>(3 * static_cast<Index>(p));
   regions.measured = true, regions.unexplained_mm = base.size_mm;
-  const auto rows = landmark_rows(base.clusters, row);
-  if (!rows.empty()) {
-    regions.surprise = surprise_of(joint, rows);
-    regions.landmarks = evaluator.scene().landmarks[static_cast<std::size_t>(row)]->names;
-  }
+  regions.mesh_mm = mesh, regions.mesh_measured = base.numerical.has_value();
+  regions.parameters.u = base.fit.u, regions.parameters.nuisances = nuisances;
+  regions.parameters.moves = joint.targets.topRows(3 * question.imaged.rows());
+  if (question.further_scans)
+    add_further_scans(question, {joint, base, nuisances, priors, discrepancy.forces, discrepancy.columns, moves.forces},
+                      regions);
+  for (TargetRegion& region : regions.points) keep_most(region.shrinks);
+  if (const auto rows = landmark_rows(base.clusters, row); !rows.empty())
+    regions.landmarks = expected_landmarks(joint, rows, *evaluator.scene().landmarks[static_cast<std::size_t>(row)]);
   return regions;
 }
 
@@ -295,22 +323,12 @@ TargetRegions find_regions(const TargetQuestion& question, const simulation::Mod
   const FreeParameters free(model);
   const VectorXd u = free.start();
   const auto nuisances = nuisances_of(model, {question.prone.name, question.pose.name}, priors);
-  Solved solved(question, model, nullptr);
-  const Places places = places_of(question, solved.x());
+  PoseAt at(*question.mesh, *question.anatomy, question.prone, question.pose, model, nullptr);
+  const Places places = places_of(*question.mesh, question.imaged, at.x(), -question.pose.gravity);
   const simulation::Embedding points(*question.mesh, places.imaged);
-  const auto forces = discrepancy_forces(*question.mesh, solved.solution.X);
-  const PoseAt at{solved.chain, solved.sensitivities, solved.model};
+  const auto forces = discrepancy_forces(*question.mesh, at.solution.X);
   PointMoves moves = moves_of(at, points, free, u, nuisances, priors.patchiness, forces);
-  // A mean square of 1 mm² along the normal of the skin, as over the clusters of a scan.
-  const calibration::ModelSkin skin(*question.mesh, solved.x());
-  const Points normals = skin.node_normals();
-  double square = 0;
-  for (const VectorXd& force : forces) {
-    const Points moved = solved.sensitivities.moved_by(0, force);
-    for (std::size_t k = 0; k < skin.nodes().size(); ++k)
-      square += std::pow(moved.row(skin.nodes()[k]).dot(normals.row(static_cast<Index>(k))), 2);
-  }
-  moves.forces *= std::sqrt((1 - share_beyond_forces) * static_cast<double>(skin.nodes().size()) / square);
+  scale_forces(at, *question.mesh, forces, moves.forces);
   const Index z = u.size() + static_cast<Index>(nuisances.size());
   JointMoves joint;
   joint.mean = VectorXd::Zero(z), joint.sd = VectorXd::Ones(z);
@@ -319,13 +337,16 @@ TargetRegions find_regions(const TargetQuestion& question, const simulation::Mod
     joint.sd[i] = prior ? prior->sd : open_sd;
   }
   fill_targets(joint, moves, places.there);
-  const double way = way_of(solved);
+  const double way = at.way_mm();
   joint.target_errors = mesh_errors(places.there, mesh_share_of_way * way, beyond_forces_length_mm);
   // The median of the half-Cauchy prior.
   const double size = std::max(priors.least_unexplained_mm, priors.share_of_way * way);
   joint.sizes_mm = VectorXd::Constant(1, size), joint.size_probability = VectorXd::Ones(1);
   TargetRegions regions = told(question, places, condition(joint), names_of(free, nuisances));
-  regions.unexplained_mm = size;
+  regions.unexplained_mm = size, regions.mesh_mm = mesh_share_of_way * way;
+  regions.parameters.u = u, regions.parameters.nuisances = nuisances;
+  regions.parameters.moves = joint.targets.topRows(3 * question.imaged.rows());
+  for (TargetRegion& region : regions.points) keep_most(region.shrinks);
   return regions;
 }
 

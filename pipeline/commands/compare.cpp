@@ -16,6 +16,7 @@
 #include "pipeline/case/model_file.h"
 #include "pipeline/case/scan_readings.h"
 #include "pipeline/picture/picture.h"
+#include "pipeline/results/targets_report.h"
 #include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/catalogue.h"
@@ -61,6 +62,8 @@ class CompareTool : public Tool {
     app.add_option("--model", model_file_,
                    "model that says where the scan lies (effect misregistration): the scan and its landmarks are moved "
                    "there first");
+    app.add_option("--expected", expected_file_,
+                   "POSE_landmarks.json of supine-targets: the landmarks' errors are held against what they should be");
     app.add_option("--pose", pose_name_, "which measurement of the case (default: the name of the pose file)");
     declare_png(app, png_, "the model's skin coloured by its distance to the scan");
   }
@@ -82,6 +85,7 @@ class CompareTool : public Tool {
     const calibration::Scan scan(surface, model, scan_name);
     check_readings(run, inputs, scan, model);
     const auto landmarks = compare_landmarks(inputs, motion, run);
+    const auto agreement = compare_to_expected(inputs, run);
     run.stage("anatomy");
     const calibration::SkinAreas areas = find_areas(inputs);
     run.stage("compare");
@@ -91,6 +95,7 @@ class CompareTool : public Tool {
     calibration::write_comparison(comparison, model, areas, run.output(skin_file));
     calibration::write_scan(comparison, scan, run.output(scan_file));
     fill(run.figures(skin_file), inputs.pose, comparison, landmarks);
+    if (agreement) add_agreement(run.figures(skin_file), *agreement);
     run.figures(scan_file) = {{"pose", inputs.pose.name},
                               {"scan_points", comparison.used.size()},
                               {"scan_points_used", comparison.scan_points_used},
@@ -101,6 +106,7 @@ class CompareTool : public Tool {
                                  comparison.scan.rms_mm, comparison.scan.mae_mm),
                      inputs.measured.side, run.output(png_));
     say(run, inputs.pose, comparison, landmarks);
+    if (agreement) say_agreement(run, *agreement);
     doubt(run, scan_name, comparison);
     return Outcome::done;
   }
@@ -161,6 +167,22 @@ class CompareTool : public Tool {
     }
   }
 
+  /// With what else is known of the pose, where --expected names it.
+  std::optional<calibration::LandmarkAgreement> compare_to_expected(const Inputs& inputs, Run& run) const {
+    if (expected_file_.empty()) return std::nullopt;
+    if (!inputs.pose.landmarks)
+      throw InputError(
+          fmt::format("--expected {}: pose '{}' has no measured landmarks to hold against it; name them as "
+                      "`landmarks` in [pose.{}], or leave the option out",
+                      expected_file_.string(), inputs.pose.name, inputs.pose.name));
+    const auto expected = read_expected_landmarks(run.input(expected_file_), inputs.pose.name);
+    try {
+      return calibration::compare_to_expected(read_landmarks(*inputs.pose.landmarks, inputs.measured.frame), expected);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", expected_file_.string(), error.what()));
+    }
+  }
+
   /// Where the model says that the scan lies. Its centroid is that of the points a Scan keeps, as in calibration.
   static calibration::ScanMotion scan_motion(const Inputs& inputs, const calibration::ModelSkin& model,
                                              const std::string& scan_name) {
@@ -214,6 +236,27 @@ class CompareTool : public Tool {
     }
   }
 
+  static void add_agreement(Json& figures, const calibration::LandmarkAgreement& agreement) {
+    for (Json& row : figures["landmarks"])
+      for (std::size_t i = 0; i < agreement.names.size(); ++i)
+        if (row["name"] == agreement.names[i]) {
+          row["off_expected_mm"] = agreement.off_mm[static_cast<Eigen::Index>(i)];
+          row["expected_mm"] = agreement.expected_mm[static_cast<Eigen::Index>(i)];
+        }
+    figures["landmark_test"] = {
+        {"chi_squared", agreement.chi_squared}, {"degrees", agreement.degrees}, {"p_value", agreement.p_value}};
+  }
+
+  static void say_agreement(const Run& run, const calibration::LandmarkAgreement& agreement) {
+    run.say(fmt::format("  {:<34}{:>8}{:>10}", "landmark, from where it should be", "mm", "expected"));
+    for (std::size_t i = 0; i < agreement.names.size(); ++i)
+      run.say(fmt::format("  {:<34}{:>8.2f}{:>10.2f}", agreement.names[i],
+                          agreement.off_mm[static_cast<Eigen::Index>(i)],
+                          agreement.expected_mm[static_cast<Eigen::Index>(i)]));
+    run.say(fmt::format("  all together: p = {:.3g} (chi squared {:.1f} with {} degrees)", agreement.p_value,
+                        agreement.chi_squared, agreement.degrees));
+  }
+
   // A scan that covers little of the skin or lies far from it is more likely somebody else's than a finding.
   static void doubt(Run& run, const std::string& scan_name, const Comparison& comparison) {
     constexpr double low_coverage = 0.5, far_mm = 8;
@@ -255,7 +298,7 @@ class CompareTool : public Tool {
     }
   }
 
-  fs::path case_folder_, pose_file_, model_file_, png_;
+  fs::path case_folder_, pose_file_, model_file_, expected_file_, png_;
   std::string pose_name_;
 };
 

@@ -198,6 +198,17 @@ class PhantomTool : public Tool {
     return figures;
   }
 
+  /// Where points inside lie, for who wants to know how well they are found.
+  static Json targets_figures(const phantom::Motion& motion) {
+    Json list = Json::array();
+    const Eigen::Index last = motion.prone.rows() - 1;
+    for (Eigen::Index i = 0; i <= last; ++i)
+      list.push_back({{"name", i == last ? std::string("tumour") : fmt::format("inside {}", i + 1)},
+                      {"prone_mm", vector_figures(motion.prone.row(i).transpose())},
+                      {"supine_mm", vector_figures(motion.supine.row(i).transpose())}});
+    return list;
+  }
+
   void add_population(const phantom::Phantom& phantom, Json& f) const {
     f["population"] = population_;
     f["gave_way"] = phantom.gave_way;
@@ -215,6 +226,7 @@ class PhantomTool : public Tool {
     if (phantom.nuisances) add_nuisances(phantom, f);
     f["base"] = {{"breast.young_modulus_kpa", phantom.body.breast_kpa},
                  {"skin.young_modulus_kpa", phantom.body.skin_kpa}};
+    f["targets"] = targets_figures(phantom.motion);
     f["side"] = phantom.body.side;
     f["geometry"] = phantom.body.numbers();
     f["volume_ml"] = phantom.volume_ml;

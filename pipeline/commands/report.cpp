@@ -8,6 +8,7 @@
 #include "pipeline/report/collect.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/shapes.h"
+#include "pipeline/report/slices.h"
 #include "pipeline/report/stages.h"
 #include "pipeline/tool/provenance.h"
 #include "pipeline/tool/tool.h"
@@ -35,7 +36,7 @@ class ReportTool : public Tool {
   void declare(CLI::App& app) override {
     app.add_option("case", case_folder_, "case folder, holds case.toml")->required();
     app.add_option("--dir", out_folder_, "folder of the case's results (default: CASE/out)");
-    app.add_flag("--no-3d", no_view3d_, "leave the 3-D view out: the page is then about 0.1 MB");
+    app.add_flag("--no-3d", no_view3d_, "leave the 3-D view and the slices out: the page is then about 0.1 MB");
   }
 
   Outcome run(Run& run) override {
@@ -54,6 +55,8 @@ class ReportTool : public Tool {
     data["texts"] = collected.texts;
     data["pictures"] = collected.pictures;
     data["shapes"] = shapes(run, measured, collected, places);
+    data["slices"] = no_view3d_ ? Json(nullptr) : slices_json(run, measured, places.out);
+    data["commands"] = {{"targets", places.make("targets")}, {"warp", places.make("warp")}};
     data["view3d"] = view3d_remark(run);
     run.stage("write");
     write(run, target, measured, data);

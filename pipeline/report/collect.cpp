@@ -42,6 +42,7 @@ std::vector<std::string> sidecar_names(const Case& measured) {
   for (const Pose& pose : measured.poses) {
     const std::string end = pose.name == "supine" ? ".json" : "_" + pose.name + ".json";
     if (pose.name != measured.imaged_pose) names.push_back(pose.name + ".json");
+    names.push_back(pose.name + "_landmarks.json");
     names.push_back("comparison" + end);
     names.push_back("scan" + end);
   }
@@ -50,7 +51,7 @@ std::vector<std::string> sidecar_names(const Case& measured) {
 
 /// Folders of the models, relative to the output folder: that of the model as given, then the others.
 std::vector<fs::path> model_folders(const fs::path& out) {
-  std::vector<fs::path> folders = {"", "calibrated", "ladder"};
+  std::vector<fs::path> folders = {"", "calibrated", "targets", "ladder"};
   if (fs::is_directory(out / "ladder"))
     for (int rung = 1; fs::is_directory(out / "ladder" / std::to_string(rung)); ++rung)
       folders.push_back(fs::path("ladder") / std::to_string(rung));

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <omp.h>
 
+#include <Eigen/Core>
 #include <csignal>
 #include <filesystem>
 #include <new>
@@ -40,6 +41,7 @@ void declare_common(CLI::App& app, Tool& tool, CommonOptions& common) {
 int use_threads(int wanted) {
   const int threads = wanted > 0 ? wanted : omp_get_max_threads();
   omp_set_num_threads(threads);
+  Eigen::setNbThreads(1);  // its products would be cut, and rounded, by the number of threads
   openblas_set_num_threads(1);
   return threads;
 }

@@ -2,6 +2,7 @@
 // supine-phantom as a program: same bytes, nothing told, bad input; and a null that is calibrated back to its truth.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "phantom/causes/cause.h"
@@ -122,6 +123,17 @@ TEST(PhantomTool, PopulationIsSaidInTheAnswer) {
   EXPECT_TRUE(answer["gave_way"].is_array());
   EXPECT_EQ(answer["motion"]["inside"].size(), 20u);
   EXPECT_GT(answer["motion"]["nipple_moved_mm"], 40);
+  // The same places as targets, and the tumour behind them.
+  ASSERT_EQ(answer["targets"].size(), 21u);
+  EXPECT_EQ(answer["targets"][20]["name"], "tumour");
+  for (std::size_t i = 0; i < 20; ++i) {
+    double square = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      square += std::pow(
+          answer["targets"][i]["supine_mm"][axis].get<double>() - answer["targets"][i]["prone_mm"][axis].get<double>(),
+          2);
+    EXPECT_NEAR(std::sqrt(square), answer["motion"]["inside"][i]["moved_mm"].get<double>(), 1e-9) << i;
+  }
 }
 
 struct BadCall {

@@ -2,7 +2,7 @@
 // The report in a real browser: browser_test.mjs BIN SMALL_RUN [PICTURES]
 // or of a page that is there: browser_test.mjs --page OUT_FOLDER [PICTURES]. Pictures of what was seen go to the folder PICTURES.
 import assert from "node:assert/strict";
-import { mkdirSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
@@ -90,6 +90,56 @@ async function check_view(page) {
   await look("from the outer side");
 }
 
+// The picture for the operating table: every region drawn, those under the skin with their depth.
+async function check_table(page) {
+  const { points } = JSON.parse(readFileSync(join(out, "targets/supine_landmarks.json")));
+  const before = await page.screenshot(join(scratch, "before the table.png"), { selector: ".scene" });
+  await page.click('[data-id="table"]');
+  await page.until(`supine.view3d.morph === 2 && document.querySelectorAll(".over .shell").length === ${points.length}`);
+  await new Promise((resolve) => setTimeout(resolve, 300));
+  const after = await page.screenshot(join(scratch, "table.png"), { selector: ".scene" });
+  assert.ok(!after.equals(before), "the table looks like what was there before");
+  const words = await page.evaluate(`document.querySelector(".over").textContent`);
+  for (const { name, nearest_skin } of points)
+    assert.ok(words.includes(nearest_skin.mm > 2 ? `${name}, ${nearest_skin.mm.toFixed(0)} mm deep` : name), `${name} is not named: ${words}`);
+  // Orthographic: the shadow of an ellipsoid is as long as its longest half axis at most, as short as its shortest at least.
+  const scale = await page.evaluate(`document.querySelector(".scene").getBoundingClientRect().height / (2 * supine.view3d.scene.camera.getParallelScale())`);
+  const drawn = await page.evaluate(`[...document.querySelectorAll(".over .shell")].map((e) => [e.rx.baseVal.value, e.ry.baseVal.value])`);
+  points.forEach(({ name, half_axes_mm: [longest, , shortest] }, k) => {
+    const [rx, ry] = drawn[k].map((r) => r / scale);
+    assert.ok(rx <= longest * 1.001 && ry >= shortest * 0.999 && rx >= ry, `region of ${name}: ${rx}, ${ry} of ${longest} to ${shortest} mm`);
+  });
+}
+
+// Slices: what scrolls, what the cross-hair links, what window and level do.
+async function check_slices(page) {
+  const state = () => page.evaluate(`({ at: supine.slice_view.at, size: supine.slice_view.volume.size, place: supine.slice_view.place(), step: supine.slice_view.volume.spacing_mm,
+    told: document.querySelector("#slices-status").textContent })`);
+  const seen = () => page.evaluate(`[...document.querySelectorAll(".slice canvas")].map((c) => c.getContext("2d").getImageData(0, 0, c.width, c.height).data.reduce((sum, v, i) => (sum * 31 + v * (i % 97)) % 1e9, 7))`);
+  const crosses = () => page.evaluate(`[...document.querySelectorAll(".slice-over")].map((s) => [...s.querySelectorAll(".cross")].map((l) => l.outerHTML).join())`);
+  const first = await state(), grey = await seen(), lines = await crosses();
+  await page.evaluate(`document.querySelector('[data-plane="axial"]').focus({ preventScroll: true })`);
+  for (let k = 0; k < 4; ++k) await page.press("ArrowUp");
+  const scrolled = await state(), grey_then = await seen(), lines_then = await crosses();
+  assert.deepEqual(scrolled.at, [first.at[0], first.at[1], Math.min(first.at[2] + 4, first.size[2] - 1)]);
+  assert.deepEqual(grey_then.map((v, k) => v !== grey[k]), [true, false, false], "one slice changes, the others stay");
+  assert.deepEqual(lines_then.map((v, k) => v !== lines[k]), [false, true, true], "the cross-hair of the others moves");
+  await page.click('[data-plane="coronal"]');
+  const clicked = await state();
+  assert.deepEqual(clicked.at.map((i, axis) => (axis === 1 ? i === scrolled.at[1] : Math.abs(i - clicked.size[axis] / 2) <= 1)), [true, true, true], `a click in the middle of the coronal slice: ${clicked.at}`);
+  const { points: [target] } = JSON.parse(readFileSync(join(out, "targets/supine_landmarks.json")));
+  await page.click(`[data-target="${target.name}"]`);
+  const there = await state();
+  target.place_mm.forEach((x, axis) => assert.ok(Math.abs(there.place[axis] - x) <= there.step / 2 + 1e-3, `${target.name} lies at ${x}, not ${there.place[axis]}, along ${axis}`));
+  assert.equal(await page.evaluate(`[...document.querySelectorAll(".slice-over")].every((s) => s.querySelector(".region"))`), true, "its region is in all three");
+  const plain = await seen();
+  for (const [key, value] of [["window", 40], ["level", 60]]) {
+    await page.evaluate(`(() => { const s = document.querySelector('[data-key="${key}"]'); s.value = ${value}; s.dispatchEvent(new Event("input")); })()`);
+    assert.notDeepEqual(await seen(), plain, `${key} changes nothing`);
+  }
+  assert.equal(await page.evaluate("[0, 40, 60, 80, 255].map((b) => supine.slice_view.shade(b)).join()"), "0,0,127.5,255,255");
+}
+
 const browser = await Browser.start(chromium);
 try {
   const calm = { "prefers-reduced-motion": "reduce" };
@@ -104,6 +154,10 @@ try {
   await picture(page, "wide", { whole: true });
   await picture(page, "view", { selector: "#view" });
   await check_view(page);
+  if (existsSync(join(out, "targets/supine_landmarks.json"))) await check_table(page);
+  if (await page.evaluate("Boolean(supine.slice_view)")) await check_slices(page);
+  await picture(page, "table", { selector: "#view" });
+  await picture(page, "slices", { selector: "#slices" });
   assert.equal(await page.evaluate("document.querySelectorAll('#page b[onload]').length"), 0, "a name became an element");
   await page.pdf(join(pictures || scratch, "print.pdf"));
   const dark = await browser.open(url, { width: 390, height: 844, media: { ...calm, "prefers-color-scheme": "dark" } });

@@ -33,18 +33,31 @@ const ladder = { rungs: [{ ...figures("", 1), p_value: 0.001, probability: 1, un
   { ...figures("ligament", 0.6), p_value: 0.4, probability: 0.97, unexplained_mm: 0.5, controls: { refit_only: figures("", 1), random_other: figures("creep", 0.95) } }],
   verdict: "missing", missing: ["ligament"], stopped: "nothing_missing: no effect lowers the held-out error", noise_floor_mm: 0.8 };
 
+// Two landmarks and two places inside the small body, marked in prone; where the landmarks were measured.
+function mark(folder) {
+  const table = (rows) => ["name,x,y,z", ...rows.map((r) => r.join(","))].join("\n") + "\n";
+  writeFileSync(join(folder, "prone.csv"), table([["nipple", 0, -39, 0], ["upper", 3, -29.2, 24]]));
+  writeFileSync(join(folder, "supine.csv"), table([["nipple", 0, -31.5, 0], ["upper", 3, -24.2, 24]]));
+  writeFileSync(join(folder, "inside.csv"), table([["near the skin", 0, -33, 4], ["deep", 12, -18, -10]]));
+  const file = join(folder, "case.toml"), text = readFileSync(file, "utf8").replace('surface = "supine.ply"', 'surface = "supine.ply"\nlandmarks = "supine.csv"');
+  writeFileSync(file, text + '[landmarks]\nprone = "prone.csv"\n');
+}
+
 // The case in `folder`, from a copy of the small run.
 export function make_case(bin, small_run, folder) {
   cpSync(small_run, folder, { recursive: true });
   const out = join(folder, "out"), model = readFileSync(join(folder, "model.toml"), "utf8");
+  mark(folder);
+  run(bin, "targets", folder, join(out, "mesh.vtu"), "--points", join(folder, "inside.csv"), "--no-other-meshes", "--no-further-scans", "-o", join(out, "targets"), "--force", "--quiet");
   for (const [name, stiffness] of [["calibrated", 1.3], ["ladder/1", 2]]) {
     const target = join(out, name);
     mkdirSync(target, { recursive: true });
     const file = join(target, "model.toml");
     writeFileSync(file, model.replace(/young_modulus_kpa = (\{ value = )?([0-9.]+)/, (_, open, value) => `young_modulus_kpa = ${open || ""}${value * stiffness}`));
     run(bin, "simulate", folder, join(out, "mesh.vtu"), "--model", file, "-o", target, "--force", "--quiet");
-    run(bin, "compare", folder, join(target, "supine.vtu"), "-o", target, "--force", "--quiet");
+    run(bin, "compare", folder, join(target, "supine.vtu"), "--expected", join(out, "targets/supine_landmarks.json"), "-o", target, "--force", "--quiet");
   }
+  run(bin, "warp", folder, "--dir", join(out, "calibrated"), "--labels", join(out, "labels.vti"), "--no-transform", "-o", join(out, "warp"), "--force", "--quiet");
   writeFileSync(join(out, "diagnosis.json"), JSON.stringify(diagnosis));
   writeFileSync(join(out, "ladder/ladder.json"), JSON.stringify(ladder));
   if (!existsSync(join(out, "overlays"))) run(bin, "segment", folder, "-o", join(folder, "again.vti"), "--overlays", join(out, "overlays"), "--quiet");

@@ -11,6 +11,7 @@
 #include "pipeline/report/encode.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/polydata.h"
+#include "pipeline/report/slices.h"
 #include "pipeline/report/stages.h"
 #include "tests/pipeline/temporary_folder.h"
 
@@ -55,6 +56,36 @@ TEST(ReportEncode, BytesThatAreNoTextBecomeTheReplacementCharacter) {
 
 TEST(ReportEncode, HtmlIsEscapedBetweenTagsAndInQuotes) {
   EXPECT_EQ(escape_html("<a href='x'>\"&\"</a>"), "&lt;a href=&#39;x&#39;&gt;&quot;&amp;&quot;&lt;/a&gt;");
+}
+
+TEST(ReportSlices, AreTheVolumeOnAnUprightGridOfAtMostSoManyVoxels) {
+  // Values rise linearly along the patient's x; the volume lies turned and is anisotropic.
+  segmentation::GreyImage volume;
+  volume.grid.size = {30, 24, 20};
+  volume.grid.spacing_mm = {1, 1.5, 2};
+  volume.grid.origin_mm = {-10, 5, -12};
+  volume.grid.direction = Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  for (int k = 0; k < 20; ++k)
+    for (int j = 0; j < 24; ++j)
+      for (int i = 0; i < 30; ++i)
+        volume.voxels.push_back(static_cast<float>(100 + 3 * volume.grid.point(Eigen::Vector3d(i, j, k)).x()));
+  const Eigen::Vector3d low(-6, 14, -8), high(6, 26, 12);
+  const GreyBytes fine = grey_bytes(volume, low, high, 1e6), coarse = grey_bytes(volume, low, high, 300);
+  EXPECT_EQ(fine.grid.spacing_mm, Eigen::Vector3d::Ones());
+  EXPECT_LE(coarse.grid.count(), 300U);
+  EXPECT_GT(coarse.grid.count(), 150U);
+  for (const GreyBytes* bytes : {&fine, &coarse}) {
+    ASSERT_EQ(bytes->voxels.size(), bytes->grid.count());
+    const double step = (bytes->white - bytes->black) / 255;
+    int within = 0;
+    for (int i = 0; i < bytes->grid.size.x(); ++i) {
+      const double value = 100 + 3 * bytes->grid.point(Eigen::Vector3d(i, 1, 1)).x();
+      if (value < bytes->black || value > bytes->white) continue;
+      EXPECT_NEAR(bytes->black + step * bytes->voxels[bytes->grid.index(i, 1, 1)], value, 0.51 * step + 1e-3);
+      ++within;
+    }
+    EXPECT_GE(within, bytes->grid.size.x() - 2);
+  }
 }
 
 const PageAssets assets = {"<t>@TITLE@</t>@STYLE@|@DATA@|@SCRIPT@|@VIEW3D@.", "p{}", "a='</script>'", "b='<!--'"};

@@ -3,7 +3,7 @@
 "use strict";
 (() => {
   const { data, el } = supine;
-  const parts = [["answer", "Answer"], ["view", "Shapes"], ["ladder", "Ladder"], ["candidates", "Effects"], ["budget", "Error budget"], ["places", "Where"],
+  const parts = [["answer", "Answer"], ["view", "Shapes"], ["targets", "Targets"], ["slices", "Slices"], ["ladder", "Ladder"], ["candidates", "Effects"], ["budget", "Error budget"], ["places", "Where"],
     ["parameters", "Parameters"], ["mesh", "Mesh"], ["provenance", "Provenance"]];
 
   const view = () => {

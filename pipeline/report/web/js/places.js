@@ -51,9 +51,17 @@
       shown.forEach((c, k) => { row["e" + k] = (c.figures.landmarks.find((l) => l.name === name) || {}).error_mm; });
       return row;
     });
-    return supine.table_figure("landmarks", "Landmarks: predicted to measured place, mm",
+    return [supine.table_figure("landmarks", "Landmarks: predicted to measured place, mm",
       [{ title: "landmark", key: "landmark" }, ...shown.map((c, k) => ({ title: `${c.pose}, ${c.model}`, key: "e" + k, digits: 1 }))], rows,
-      { caption: "Not fitted: they show skin that slid along itself, which the distance to a surface cannot." });
+      { caption: "They show skin that slid along itself, which the distance to a surface cannot." }), agreement(shown.filter((c) => c.figures.landmark_test))];
+  };
+  // Landmarks against where all else that is known has them; the same for every model of a pose.
+  const agreement = (tested) => {
+    const poses = tested.filter((c, k) => tested.findIndex((other) => other.pose === c.pose) === k);
+    return poses.map(({ pose, file, figures }) => supine.table_figure(`landmark-test-${pose}`, `Landmarks in ${pose}, from where all else has them, mm`,
+      [{ title: "landmark", key: "name" }, { title: "off", key: "off_expected_mm", digits: 1 }, { title: "to be expected (rms)", key: "expected_mm", digits: 1 }], figures.landmarks,
+      { caption: supine.el("span", {}, "All together: p = ", supine.p_value(figures.landmark_test.p_value), ", χ² = ", supine.shown(file, ["landmark_test", "chi_squared"], 1), " with ",
+        supine.shown(file, ["landmark_test", "degrees"], 0), " degrees of freedom.") }));
   };
   const hot_spots = () => {
     const d = data.figures[supine.first_file("diagnosis.json", "ladder/diagnosis.json")];

@@ -16,7 +16,7 @@ class View {
     this.pose = preferred.poses[supine.data.case.predicted] ? supine.data.case.predicted : Object.keys(preferred.poses)[0];
     this.morph = 2;
     this.colour = model.distance_of(this.state, this.pose) ? "distance" : "plain";
-    this.show = { skin: 1, organs: true, scan: "off", muscle: false, landmarks: true, labels: true, ghost: false };
+    this.show = { skin: 1, organs: true, scan: "off", muscle: false, landmarks: true, labels: true, ghost: false, regions: false };
     this.place = el("div", { class: "scene", tabindex: 0, role: "application", "aria-label": "3-D view of the breast; arrow keys turn it, plus and minus zoom, 1 to 5 are views" });
     this.panel = el("div", { class: "panel" });
     this.status = el("p", { class: "hint", role: "status", "aria-live": "polite" });
@@ -84,11 +84,21 @@ class View {
         model.organs.length ? check_box(model.organs.map((o) => o.name).join(", "), show.organs, set("organs"), colours.organ[model.organs[0].name]) : "",
         picker("measured scan ", [["off", "off"], ["points", "points"], ["surface", "surface"]], show.scan, set("scan")),
         check_box("landmarks (● predicted, ○ measured)", show.landmarks, set("landmarks")), check_box("names of what is off", show.labels, set("labels")),
+        model.targets_of(this.pose).length ? check_box("95 % regions and depths", show.regions, set("regions")) : "",
         check_box(`${imaged} shape beside it`, show.ghost, set("ghost")), check_box(supine.data.case.side === "none" ? "supports" : "chest muscle", show.muscle, set("muscle"))),
       group("Look from", el("div", { class: "row" }, [["front", "front"], ["outer", both ? "left side" : "outer side"], ["inner", both ? "right side" : "inner side"], ["feet", "feet"], ["head", "head"]]
         .map(([id, label]) => el("button", { type: "button", "data-view": id, onclick: () => this.view(id) }, label)))),
+      model.targets_of(this.pose).length ? el("button", { type: "button", "data-id": "table", onclick: () => this.on_the_table() }, `Targets in ${this.pose}`) : "",
       el("p", { class: "hint" }, "Drag to turn, wheel to zoom. Keys in the picture: arrows, + −, 1 to 5, 0."),
       el("button", { type: "button", onclick: () => this.save() }, "Scan and distances as CSV"));
+  }
+
+  // What is asked for before an operation: the body see-through, what is in it, regions and depths.
+  on_the_table() {
+    Object.assign(this.show, { skin: 0.4, organs: true, regions: true, labels: false, scan: "off", landmarks: false });
+    this.colour = "plain";
+    this.make_panel();
+    this.set_morph(2);
   }
 
   view(name) {
@@ -182,10 +192,20 @@ class View {
     const spots = this.show.labels && this.colour === "distance" ? model.spots_of(this.state, this.pose).filter((s) => faces(s.point)) : [];
     const marks = this.show.landmarks ? model.landmarks_at(this.state, this.pose, this.morph) : [];
     const seen = marks.filter((m) => faces(nearest(this.points, m.predicted, (i) => model.region_of_point[i] === 2)));
+    const targets = this.show.regions && this.morph > 1.999 ? model.targets_of(this.pose) : [];
     const gravity = this.morph < 0.5 ? model.gravity_of(supine.data.case.imaged) : this.morph > 1.5 ? model.gravity_of(this.pose) : [0, 0, 0];
     this.overlay.draw(width, height, spots.map((s) => ({ text: s.text, at: this.scene.project(row(this.points, s.point)) })),
       seen.map((m) => ({ name: m.name, predicted: this.scene.project(m.predicted), measured: m.measured && this.scene.project(m.measured) })),
-      gravity.every((g) => g === 0) ? null : this.scene.flat(gravity));
+      gravity.every((g) => g === 0) ? null : this.scene.flat(gravity), targets.map((t) => this.flat_target(t)));
+  }
+
+  // A region's outline in the picture, and the way to the nearest skin.
+  flat_target({ name, place, half_axes, axes, skin, depth }) {
+    const at = this.scene.project(place), far = axes.map((axis, k) => {
+      const [x, y] = this.scene.project(plus(place, scaled(axis, half_axes[k])));
+      return [x - at[0], y - at[1]];
+    });
+    return { name, at, far, skin: skin && this.scene.project(skin), depth };
   }
 
   key(event) {

@@ -76,6 +76,13 @@ export function landmarks_at(state, pose, morph) {
   });
 }
 
+// [{name, place, half_axes, axes, skin: [x, y, z] or null, depth: mm or null}] of what supine-targets found in the pose.
+export function targets_of(pose) {
+  const found = supine.targets_of(pose);
+  return (found ? found.points : []).map((p) => ({ name: p.name, place: p.place_mm, half_axes: p.half_axes_mm, axes: p.axes, skin: p.nearest_skin && p.nearest_skin.place_mm,
+    depth: p.nearest_skin && p.nearest_skin.mm }));
+}
+
 const folder_of = (state) => ({ given: "", calibrated: "calibrated/" }[state.id] ?? "ladder/" + state.id.slice(5) + "/");
 export const comparison_file = (state, pose) => `${folder_of(state)}comparison${pose === "supine" ? "" : "_" + pose}.json`;
 export const comparison_of = (state, pose) => data.figures[comparison_file(state, pose)] || null;

@@ -11,17 +11,29 @@ export class Overlay {
     holder.append(this.svg);
   }
 
-  // labels: {at: [x, y], text}; landmarks: {name, predicted: [x, y] or null, measured: [x, y] or null}; gravity: [dx, dy]
-  draw(width, height, labels, landmarks, gravity) {
+  // labels: {at: [x, y], text}; landmarks: {name, predicted: [x, y] or null, measured: [x, y] or null}; gravity: [dx, dy];
+  // targets: {name, at: [x, y], far: the ends of the half axes from there, skin: [x, y] or null, depth}
+  draw(width, height, labels, landmarks, gravity, targets = []) {
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     const placed = place(labels, width, height);
-    this.svg.replaceChildren(...landmarks.flatMap(mark), ...placed.flatMap(({ at, box, above, text: words }) => {
+    this.svg.replaceChildren(...targets.flatMap(region), ...landmarks.flatMap(mark), ...placed.flatMap(({ at, box, above, text: words }) => {
       const left = box.x + box.width / 2 < at[0];
       const edge = above ? [box.x + box.width / 2, box.y + box.height] : [left ? box.x + box.width + 3 : box.x - 3, box.y + box.height / 2];
       return [node("path", { class: "leader", d: `M${edge}L${at}` }), node("circle", { class: "predicted", cx: at[0], cy: at[1], r: 2.5 }),
         text(box.x, box.y + 13, words, "strong")];
     }), ...arrow(gravity, height));
   }
+}
+
+// The outline of an ellipsoid seen from far away: with the ends of its half axes as columns of M it is { M Mᵀ }^½ of a circle.
+function region({ name, at, far, skin, depth }) {
+  const a = far.reduce((sum, f) => sum + f[0] * f[0], 0), b = far.reduce((sum, f) => sum + f[0] * f[1], 0), c = far.reduce((sum, f) => sum + f[1] * f[1], 0);
+  const middle = (a + c) / 2, spread = Math.hypot((a - c) / 2, b), turn = (0.5 * Math.atan2(2 * b, a - c) * 180) / Math.PI;
+  const nodes = [node("ellipse", { class: "shell", cx: at[0], cy: at[1], rx: Math.sqrt(middle + spread), ry: Math.sqrt(Math.max(middle - spread, 0)), transform: `rotate(${turn} ${at[0]} ${at[1]})` })];
+  const inside = skin && depth > 2;
+  if (inside) nodes.push(node("line", { class: "depth", x1: at[0], y1: at[1], x2: skin[0], y2: skin[1] }), node("circle", { class: "predicted", cx: skin[0], cy: skin[1], r: 3 }));
+  nodes.push(text(at[0] + 10, at[1] + 4, inside ? `${name}, ${depth.toFixed(0)} mm deep` : name, "strong"));
+  return nodes;
 }
 
 function mark({ name, predicted, measured }) {

@@ -1,0 +1,145 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: AGPL-3.0-or-later
+"""How often the 95 % regions of supine-targets hold the truth: target_coverage.py CASES WORK [BIN] [--only WORDS] [--score]
+
+CASES holds case folders and answers/NAME.json. Where the answer has `targets` (supine-phantom), those places are asked for; landmarks that were
+measured in the pose are held against where all else expects them, in every case. Meshes and answers of the tool go to WORK and are kept: what is
+there is not made again. --score makes nothing and counts what is there.
+"""
+import argparse
+import csv
+import json
+import math
+import pathlib
+import subprocess
+import sys
+
+QUANTILE_3 = 7.814727903251178  # of chi squared with 3 degrees, 0.95
+POSE = "supine"
+
+
+def run(binaries, tool, *words):
+    done = subprocess.run([str(binaries / f"supine-{tool}"), *map(str, words), "--force", "--quiet", "--threads", "1"], capture_output=True, text=True)
+    if done.returncode not in (0, 1):
+        raise RuntimeError(f"supine-{tool}: {done.stderr.strip()}")
+
+
+def make(binaries, case, answer, out):
+    """Mesh and regions of a case."""
+    out.mkdir(parents=True, exist_ok=True)
+    if not (out / "mesh.vtu").exists():
+        run(binaries, "segment", case, "-o", out / "labels.vti")
+        run(binaries, "reconstruct", out / "labels.vti", "-o", out)
+        run(binaries, "decimate", out / "breast.vtp", "-o", out / "coarse.vtp")
+        run(binaries, "tetrahedralise", out / "coarse.vtp", out / "muscle.vtp", out / "labels.vti", "-o", out / "mesh.vtu")
+    asked = []
+    if "targets" in answer:
+        with open(out / "asked.csv", "w", newline="", encoding="utf-8") as stream:
+            table = csv.writer(stream, lineterminator="\n")
+            table.writerow(["name", "x", "y", "z"])
+            table.writerows([t["name"], *t["prone_mm"]] for t in answer["targets"])
+        asked = ["--points", out / "asked.csv"]
+    run(binaries, "targets", case, out / "mesh.vtu", *asked, "--pose", POSE, "--no-further-scans", "-o", out / "targets")
+
+
+def solve(matrix, right):
+    """Gauss with pivots."""
+    rows = [list(row) + [b] for row, b in zip(matrix, right)]
+    n = len(rows)
+    for k in range(n):
+        best = max(range(k, n), key=lambda i: abs(rows[i][k]))
+        rows[k], rows[best] = rows[best], rows[k]
+        for i in range(k + 1, n):
+            factor = rows[i][k] / rows[k][k]
+            rows[i] = [a - factor * b for a, b in zip(rows[i], rows[k])]
+    x = [0.0] * n
+    for k in reversed(range(n)):
+        x[k] = (rows[k][n] - sum(rows[k][j] * x[j] for j in range(k + 1, n))) / rows[k][k]
+    return x
+
+
+def square(off, covariance):
+    return sum(a * b for a, b in zip(off, solve(covariance, off)))
+
+
+def measured_landmarks(case):
+    with open(case / f"{POSE}_landmarks.csv", encoding="utf-8") as stream:
+        return {row["name"]: [float(row[axis]) for axis in "xyz"] for row in csv.DictReader(stream)}
+
+
+def score(case, answer, found):
+    """Rows of (kind of point, name, error, sd, square)."""
+    rows = []
+    truth = {t["name"]: t[f"{POSE}_mm"] for t in answer.get("targets", [])}
+    for point in found["points"]:
+        if point["name"] in truth:
+            off = [a - b for a, b in zip(truth[point["name"]], point["place_mm"])]
+            kind = "tumour" if point["name"] == "tumour" else "inside"
+            rows.append((kind, point["name"], math.hypot(*off), point["sigma_mm"], square(off, point["covariance_mm2"])))
+    expected, places = found["landmarks"], measured_landmarks(case)
+    for i, name in enumerate(expected["names"] if expected else []):
+        off = [a - b for a, b in zip(places[name], expected["expected_mm"][i])]
+        block = [row[3 * i:3 * i + 3] for row in expected["covariance_mm2"][3 * i:3 * i + 3]]
+        sd = math.sqrt(sum(block[k][k] for k in range(3)) / 3)
+        rows.append(("landmark", name, math.hypot(*off), sd, square(off, block)))
+    return rows
+
+
+def binomial_bounds(count, share=0.95, outside=0.025):
+    """Least and largest number of hits that are not unlikely."""
+    chances = [math.comb(count, k) * share**k * (1 - share)**(count - k) for k in range(count + 1)]
+    low = next(k for k in range(count + 1) if sum(chances[:k + 1]) > outside)
+    high = next(k for k in reversed(range(count + 1)) if sum(chances[k:]) > outside)
+    return low, high
+
+
+def table(group, scored):
+    print(f"{group}: {len(scored)} cases")
+    for kind in ("tumour", "inside", "landmark"):
+        rows = [row for _, found, _ in scored for row in found if row[0] == kind]
+        if not rows:
+            continue
+        hits = sum(row[4] <= QUANTILE_3 for row in rows)
+        error = math.sqrt(sum(row[2]**2 for row in rows) / len(rows) / 3)
+        sd = math.sqrt(sum(row[3]**2 for row in rows) / len(rows))
+        low, high = binomial_bounds(len(rows))
+        print(f"  {kind:<9} {hits:>4} of {len(rows):<4} in the 95 % region ({100 * hits / len(rows):5.1f} %; {low} to {high} if each were by itself), "
+              f"error {error:.2f} mm per axis, stated {sd:.2f}, square / 3 {sum(row[4] for row in rows) / len(rows) / 3:.2f}")
+    p_values = sorted(p for _, _, p in scored if p is not None)
+    if p_values:
+        print(f"  landmark test: p < 0.05 in {sum(p < 0.05 for p in p_values)} of {len(p_values)}, median p {p_values[len(p_values) // 2]:.2f}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", type=pathlib.Path)
+    parser.add_argument("work", type=pathlib.Path)
+    parser.add_argument("bin", type=pathlib.Path, nargs="?", default=pathlib.Path("build/bin"))
+    parser.add_argument("--only", default="")
+    parser.add_argument("--score", action="store_true")
+    given = parser.parse_args()
+    groups = {}
+    for case in sorted(path.parent for path in given.cases.glob("*/case.toml") if given.only in path.parent.name):
+        answer = json.loads((given.cases / "answers" / f"{case.name}.json").read_text())
+        out = given.work / case.name
+        told = out / "targets" / f"{POSE}_landmarks.json"
+        if not told.exists() and given.score:
+            continue
+        try:
+            if not told.exists():
+                make(given.bin.resolve(), case, answer, out)
+        except RuntimeError as why:
+            print(f"{case.name}: {why}", file=sys.stderr)
+            continue
+        found = json.loads(told.read_text())
+        rows = score(case, answer, found)
+        causes = "null" if "null" in case.name or answer.get("causes") == [] or answer.get("effect") == "null" else "with a cause"
+        groups.setdefault(causes, []).append((case.name, rows, (found["landmarks"] or {}).get("p_value")))
+        outside = [f"{name} ({math.sqrt(s):.1f})" for _, name, _, _, s in rows if s > QUANTILE_3]
+        print(f"{case.name:<22} unexplained {found['unexplained_mm']:.2f} mm; outside: {', '.join(outside) or '-'}", flush=True)
+    for group, scored in groups.items():
+        table(group, scored)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+// Where points inside a twin lie, and how sure that is.
+#include "diagnosis/targets/regions.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/statistics.h"
+#include "diagnosis/targets/draws.h"
+#include "diagnosis/targets/moves.h"
+#include "diagnosis/targets/places.h"
+#include "diagnosis/weighted_fit.h"
+#include "tests/calibration/twin.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using supine::testing::Twin;
+
+/// Middles of some cells, spread over the body.
+Points inside(const meshing::TetMesh& mesh) {
+  Points points(4, 3);
+  for (int p = 0; p < 4; ++p)
+    points.row(p) = mesh.points(mesh.cells.row((p + 1) * mesh.cells.rows() / 5).head(4), Eigen::all).colwise().mean();
+  return points;
+}
+
+struct Asked {
+  Twin twin{{supine::testing::twin_truth(), 0.3}};
+  TargetQuestion question{&twin.mesh, &twin.anatomy, twin.prone, twin.supine, {"a", "b", "c", "d"}, inside(twin.mesh)};
+  Points truth() const { return simulation::Embedding(twin.mesh, question.imaged).at(twin.solution.poses[0].x); }
+};
+
+/// A fit of the twin's scan, without other meshes: the truth lies on this one.
+struct Fitted : Asked {
+  simulation::Model start = supine::testing::twin_start();
+  calibration::Evaluator evaluator{twin.scene(), start, accurate_enough()};
+  Priors priors;
+  BaseFit base = fit();
+  BaseFit fit() {
+    BaseFitOptions options;
+    options.other_meshes = false;
+    return fit_base_model(evaluator, start, start, {0.3}, nullptr, options);
+  }
+};
+
+TEST(PointMoves, AreThoseOfTheModelSolvedAgain) {
+  const Asked asked;
+  const simulation::Model model = supine::testing::twin_truth();
+  const auto& [mesh, anatomy, prone, pose, names, imaged, further] = asked.question;
+  const PointMoves moves = [&] {
+    PoseAt at(*mesh, *anatomy, prone, pose, model, nullptr);
+    const calibration::FreeParameters free(model);
+    return moves_of(at, simulation::Embedding(*mesh, imaged), free, free.start(),
+                    nuisances_of(model, {"prone", "supine"}, {}), {}, {});
+  }();
+  const calibration::FreeParameters free(model);
+  const auto nuisances = nuisances_of(model, {"prone", "supine"}, {});
+  simulation::Chain chain(*mesh, *anatomy, model, {prone, pose}, accurate_enough());
+  const simulation::ChainSolution near = chain.solve(model);
+  const auto places = [&](const simulation::Model& at) -> Eigen::VectorXd {
+    const Points there = simulation::Embedding(*mesh, imaged).at(chain.solve(at, &near).poses[0].x);
+    return Eigen::Map<const Eigen::VectorXd>(there.data(), there.size());
+  };
+  constexpr double step = 1e-3;
+  for (Eigen::Index i = 0; i < free.size(); ++i) {
+    Eigen::VectorXd up = free.start(), down = free.start();
+    up[i] += step, down[i] -= step;
+    const Eigen::VectorXd slope = (places(free.model(up)) - places(free.model(down))) / (2 * step);
+    EXPECT_GT(slope.norm(), 1e-2);
+    EXPECT_LT((slope - moves.parameters.col(i)).norm(), 1e-3 * slope.norm()) << i;
+  }
+  int moved = 0;
+  for (std::size_t k = 0; k < nuisances.size(); ++k) {
+    std::vector<Nuisance> up = nuisances, down = nuisances;
+    up[k].value = step, down[k].value = -step;
+    const Eigen::VectorXd slope = (places(with_nuisances(model, up, {"prone", "supine"})) -
+                                   places(with_nuisances(model, down, {"prone", "supine"}))) /
+                                  (2 * step);
+    moved += slope.norm() > 1e-2;
+    EXPECT_LT((slope - moves.nuisances.col(static_cast<Eigen::Index>(k))).norm(), 2e-3 * slope.norm() + 1e-4)
+        << nuisances[k].name();
+  }
+  EXPECT_GE(moved, 5) << "gravity, breath, skin, springs";
+}
+
+TEST(PlacesOfTargets, NearestSkinAndTheSkinAboveAreOnTheSkin) {
+  const Asked asked;
+  const Points& x = asked.twin.solution.poses[0].x;
+  const Eigen::Vector3d up = -asked.twin.supine.gravity;
+  const Places places = places_of(asked.twin.mesh, asked.question.imaged, x, up);
+  const calibration::ModelSkin skin(asked.twin.mesh, x);
+  calibration::ClosestPoints closest;
+  skin.distance().closest(places.there, closest);
+  int over = 0;
+  for (Eigen::Index p = 0; p < 4; ++p) {
+    const Eigen::Vector3d target = places.there.row(p), near = places.there.row(4 + p), above = places.there.row(8 + p);
+    double least = 1e9;
+    for (const int node : skin.nodes()) least = std::min(least, (x.row(node).transpose() - target).norm());
+    EXPECT_LE((near - target).norm(), least + 1e-9) << "no node of the skin is nearer";
+    if (!places.has_straight[static_cast<std::size_t>(p)]) continue;
+    ++over;
+    EXPECT_NEAR((above - target).normalized().dot(up), 1, 1e-9) << "straight up";
+    EXPECT_GE((above - target).norm(), (near - target).norm() - 1e-9);
+  }
+  EXPECT_GE(over, 3);
+}
+
+TEST(TargetRegionsOfATwin, HoldTheTruthAndAreTighterThanWithoutTheScan) {
+  Fitted fitted;
+  fitted.question.further_scans = true;
+  const TargetRegions known = find_regions(fitted.question, fitted.evaluator, fitted.base, fitted.priors);
+  const TargetRegions guessed = find_regions(fitted.question, fitted.start, fitted.priors);
+  EXPECT_TRUE(known.measured);
+  EXPECT_FALSE(guessed.measured);
+  const Points truth = fitted.truth();
+  for (std::size_t p = 0; p < 4; ++p) {
+    const TargetRegion& region = known.points[p];
+    const Eigen::Vector3d off = truth.row(static_cast<Eigen::Index>(p)).transpose() - region.place_mm;
+    EXPECT_LT(off.dot(region.covariance.ldlt().solve(off)), chi_squared_quantile(3, 0.999)) << region.name;
+    EXPECT_LT(region.sd_mm(), 0.8 * guessed.points[p].sd_mm()) << region.name;
+    EXPECT_GT(region.half_axes_mm[2], 0);
+    EXPECT_NEAR(std::pow(region.half_axes_mm.norm(), 2), chi_squared_quantile(3, 0.95) * region.covariance.trace(),
+                1e-9);
+    ASSERT_TRUE(region.nearest);
+    EXPECT_GT(region.nearest->sd_mm, 0);
+    EXPECT_LT(region.nearest->sd_mm, region.half_axes_mm[0]);
+    ASSERT_FALSE(region.shrinks.empty());
+    for (std::size_t k = 0; k < region.shrinks.size(); ++k) {
+      EXPECT_GE(region.shrinks[k].share, -1e-9) << region.shrinks[k].what;
+      EXPECT_LT(region.shrinks[k].share, 1) << region.shrinks[k].what;
+      if (k > 0) {
+        EXPECT_LE(region.shrinks[k].share, region.shrinks[k - 1].share);
+      }
+    }
+  }
+  const auto scan = [](const TargetRegion& region) {
+    return std::any_of(region.shrinks.begin(), region.shrinks.end(),
+                       [](const Shrink& shrink) { return shrink.what.starts_with("scan "); });
+  };
+  EXPECT_TRUE(std::any_of(known.points.begin(), known.points.end(), scan));
+}
+
+TEST(TargetRegionsOfATwin, AreWhatDrawsThroughTheChainSpread) {
+  Fitted fitted;
+  const TargetRegions known = find_regions(fitted.question, fitted.evaluator, fitted.base, fitted.priors);
+  const DrawnPlaces drawn =
+      draw_places(fitted.question, *fitted.base.parameters, known, &fitted.base.fit.prediction.solution, 60, 1);
+  EXPECT_EQ(drawn.draws, 60);
+  EXPECT_LE(drawn.failed, 3);
+  for (Eigen::Index p = 0; p < 4; ++p) {
+    EXPECT_GT(drawn.linear_sd_mm[p], 0.05);
+    EXPECT_NEAR(drawn.drawn_sd_mm[p] / drawn.linear_sd_mm[p], 1, 0.3) << p;
+    EXPECT_LT(drawn.mean_off_mm[p], drawn.linear_sd_mm[p]);
+    EXPECT_GT(drawn.inside[p], 0.8);
+  }
+}
+
+TEST(TargetRegionsOfATwin, LandmarksThatLieElsewhereAreTold) {
+  Asked asked;
+  const Points& imaged = asked.twin.mesh.points;
+  const std::vector<int> nodes = {0, static_cast<int>(imaged.rows() / 3), static_cast<int>(imaged.rows() - 1)};
+  calibration::MeasuredLandmarks marks{{"a", "b", "c"},
+                                       imaged(nodes, Eigen::all),
+                                       asked.twin.solution.poses[0].x(nodes, Eigen::all),
+                                       Eigen::VectorXd::Constant(3, 1.0)};
+  const auto told = [&] {
+    calibration::MeasuredScene scene = asked.twin.scene();
+    scene.landmarks = {&marks};
+    const simulation::Model start = supine::testing::twin_start();
+    calibration::Evaluator evaluator(scene, start, accurate_enough());
+    BaseFitOptions options;
+    options.other_meshes = false;
+    const BaseFit base = fit_base_model(evaluator, start, start, {0.3}, nullptr, options);
+    return *find_regions(asked.question, evaluator, base, {}).landmarks;
+  };
+  const ExpectedLandmarks right = told();
+  EXPECT_GT(right.p_value, 0.05);
+  EXPECT_LT((right.expected - marks.measured).norm(), 3 * std::sqrt(right.covariance.trace()));
+  marks.measured.row(0) += Eigen::RowVector3d(9, 0, -9);
+  EXPECT_LT(told().p_value, 0.01);
+}
+
+}  // namespace
+}  // namespace supine::diagnosis
