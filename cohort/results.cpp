@@ -259,7 +259,8 @@ Ordered pooled(const std::vector<CaseResults>& cases, const PoolOptions& options
     if (!one.diagnosis.is_object()) continue;
     ++diagnosed;
     without_singles += !one.diagnosis.contains("singles");
-    const std::string verdict = one.diagnosis.value("verdict", "");
+    const auto verdict =
+        reading(one, "diagnosis.json", [&one = one] { return one.diagnosis.value("verdict", std::string()); });
     verdicts[verdict] = verdicts.value(verdict, 0) + 1;
   }
   return {{"patients", cases.size()},
