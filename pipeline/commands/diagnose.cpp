@@ -83,15 +83,15 @@ class DiagnoseTool : public Tool {
     app.add_option("--registration-mm", known_.registration_mm,
                    "how well each scan's place is known, 1 sigma per direction, mm; its turn goes with it, 0.75 "
                    "degrees per mm (default: registration_mm of the case, else 2). 0.3 where markers were used")
-        ->check(CLI::NonNegativeNumber);
+        ->check(not_below_zero());
     app.add_option("--segmentation-mm", known_.segmentation_mm,
                    "how well the imaged skin's place is known, 1 sigma, mm (default: segmentation_mm of the case, "
                    "else 0.3)")
-        ->check(CLI::NonNegativeNumber);
+        ->check(not_below_zero());
     app.add_option("--chest-wall-mm", known_.chest_wall_mm,
                    "how far breath may move the muscle between two scans, 1 sigma, mm (default: breath_mm of the "
                    "case, else 1)")
-        ->check(CLI::NonNegativeNumber);
+        ->check(not_below_zero());
     app.add_option("--prior", prior_of_sets_,
                    "probabilities, before anything is measured, that nothing, one, two and three effects are missing: "
                    "four numbers > 0 that add up to 1 (default: 0.5,0.3,0.15,0.05)")

@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "common/error.h"
+#include "common/trial_process.h"
 #include "segmentation/formats/data_file.h"
 #include "segmentation/formats/image_formats.h"
 
@@ -20,6 +21,7 @@ namespace {
 struct IoStateDeleter {
   void operator()(NrrdIoState* state) const { nrrdIoStateNix(state); }
 };
+using IoState = std::unique_ptr<NrrdIoState, IoStateDeleter>;
 
 struct NrrdDeleter {
   void operator()(Nrrd* nrrd) const { nrrdNuke(nrrd); }
@@ -130,23 +132,34 @@ void check_voxel_bytes(const std::filesystem::path& file, const Nrrd& header, co
     check_holdable(file, nrrdElementNumber(&header), bytes.size(), false);
 }
 
-NrrdPointer load(const std::filesystem::path& file, bool header_only) {
+NrrdPointer load(const std::filesystem::path& file, bool header_only, NrrdIoState& io) {
   NrrdPointer nrrd(nrrdNew());
-  const std::unique_ptr<NrrdIoState, IoStateDeleter> io(nrrdIoStateNew());
-  io->skipData = header_only;
-  if (nrrdLoad(nrrd.get(), file.c_str(), io.get()) != 0)
+  io.skipData = header_only;
+  if (nrrdLoad(nrrd.get(), file.c_str(), &io) != 0)
     throw InputError(
         fmt::format("{}: cannot be read as NRRD (damaged or truncated?): {}", file.string(), teem_error()));
-  if (header_only) check_voxel_bytes(file, *nrrd, *io);
   return nrrd;
+}
+
+/// Teem does not stand every damaged header, nor every damaged text or bzip2; bytes, plain or deflated, it does.
+void try_loading(const std::filesystem::path& file) {
+  check_survivable(file, [&file] {
+    const IoState io(nrrdIoStateNew());
+    load(file, true, *io);
+    if (io->encoding != nrrdEncodingRaw && io->encoding != nrrdEncodingGzip)
+      load(file, false, *IoState(nrrdIoStateNew()));
+  });
 }
 
 }  // namespace
 
 RawImage read_nrrd(const std::filesystem::path& file) {
   RawImage image;
+  try_loading(file);
   {
-    const NrrdPointer header = load(file, true);
+    const IoState io(nrrdIoStateNew());
+    const NrrdPointer header = load(file, true, *io);
+    check_voxel_bytes(file, *header, *io);
     check_axes(file, *header);
     image.frame = frame_of(file, *header);
     for (int a = 0; a < 3; ++a)
@@ -155,7 +168,7 @@ RawImage read_nrrd(const std::filesystem::path& file) {
     check_size(file, image.grid.size);
     read_axes(file, *header, image);
   }
-  const NrrdPointer nrrd = load(file, false);
+  const NrrdPointer nrrd = load(file, false, *IoState(nrrdIoStateNew()));
   image.voxels.resize(image.grid.count());
   const auto lookup = nrrdFLookup[nrrd->type];
   for (std::size_t n = 0; n < image.voxels.size(); ++n) image.voxels[n] = lookup(nrrd->data, n);

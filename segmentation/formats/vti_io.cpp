@@ -182,7 +182,7 @@ void write_labels(const LabelImage& labels, const std::filesystem::path& file, c
   writer->RemoveAllObservers();
   writer->GetExecutive()->RemoveAllObservers();
   if (!written || !errors.message().empty())
-    throw InputError(fmt::format("{}: cannot be written: {}", file.string(), errors.message()));
+    throw InputError(fmt::format("{}: cannot be written (disk full, or no permission?)", file.string()));
 }
 
 LabelImage read_labels(const std::filesystem::path& file) {

@@ -2,7 +2,6 @@
 // The readers under libFuzzer: fuzz_readers --target=NAME [options of libFuzzer] CORPUS. See README.md.
 #include <pthread.h>
 #include <sanitizer/common_interface_defs.h>
-#include <vtkObject.h>
 
 #include <cstdint>
 #include <cstdio>
@@ -39,7 +38,6 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
     std::exit(2);
   }
   pthread_atfork(nullptr, nullptr, forget_the_fuzzer);
-  vtkObject::GlobalWarningDisplayOff();
   return 0;
 }
 

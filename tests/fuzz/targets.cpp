@@ -63,7 +63,7 @@ void read_mesh_file(const fs::path& folder) {
 
 void read_case_file(const fs::path& folder) {
   for (const char* beside : {"labels.nrrd", "supine.ply", "tilt45.ply", "prone.csv", "supine.csv", "cohort.json"})
-    std::ofstream(folder / beside) << "only has to be there\n";
+    std::ofstream(folder / beside) << beside;  // they only have to be there, and to differ
   pipeline::read_case(folder);
 }
 

@@ -170,11 +170,10 @@ void put_results(const fs::path& folder) {
               R"("sd": 0.1, "prior_mean": 0.3, "prior_sd": 0.5, "usual": 0.4, "usual_moves_mm": 1.0}]}]})",
               R"({"rms_mm": 1.2, "parameters": [{"name": "breast.young_modulus_kpa", "value": 0.3, "unit": "kPa", )"
               R"("interval95": [0.2, 0.4]}], "worth": {"coordinates": [{"name": "breast.young_modulus_kpa", )"
-              R"("coordinate": "ln(value)", "at": -1.2, "sd": 0.1, "prior_mean": -1.2, "prior_sd": 0.5}]
+              R"~("coordinate": "ln(value)", "at": -1.2, "sd": 0.1, "prior_mean": -1.2, "prior_sd": 0.5}]
 }
-})",
-              R"({"rms_mm": 1.5, "mae_study_mm": 1.1, "areas": [{"name": "upper outer", "mean_signed_mm": 0.2}]})"
-}));
+})~",
+              R"({"rms_mm": 1.5, "mae_study_mm": 1.1, "areas": [{"name": "upper outer", "mean_signed_mm": 0.2}]})"}));
 }
 
 }  // namespace
