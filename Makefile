@@ -6,6 +6,8 @@
 #                                    then calibrate, diagnose, ladder, sensitivity, targets, warp; report: one page of what is there
 #   make COHORT=dir [TARGET=stage] [OUT=dir] [PROFILE=cohort/slurm]
 #                                    the same for every case in the folder; with PROFILE through Snakemake: cohort/README.md
+#   make fuzz [FUZZ_SECONDS=60] [FUZZ_TARGETS="ply vtu"] [FUZZ_SEED=0]
+#                                    every reader of files under libFuzzer, for that long each: tests/fuzz/README.md
 #   make style                       whether every source file is as clang-format 14 writes it; make format writes it
 #   make build                       only build, into $(BUILD); make tools: without tests and measurements
 #   make package                     Debian packages in $(BUILD)/package; make package-test installs and tries them in a bare Debian 12
@@ -28,7 +30,7 @@ run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 # Data that the repository does not hold: docs/data.md.
 DATA ?= data
 
-.PHONY: style format bench study hidden demo test build tools package package-test configure setup clean help case cohort $(stages)
+.PHONY: style format bench study hidden demo test fuzz build tools package package-test configure setup clean help case cohort $(stages)
 
 ifdef CASE
 case: tools
@@ -84,6 +86,17 @@ package-test: package
 
 test: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel 2
+
+# Clang's own build folder, of which only the fuzzer is built.
+FUZZ_SECONDS ?= 60
+FUZZ_SEED ?= 0
+fuzz: setup
+	@echo 'extern "C" int LLVMFuzzerTestOneInput(const char*, unsigned long) { return 0; }' | \
+	  clang++ -fsanitize=fuzzer,address -fopenmp -x c++ - -o /dev/null 2>/dev/null || \
+	  { echo "make fuzz needs clang, its runtime and its OpenMP: apt-get install clang libclang-rt-14-dev libomp-dev" >&2; exit 2; }
+	@[ -f build-fuzz/build.ninja ] || cmake --preset fuzz
+	@cmake --build build-fuzz --parallel $(JOBS) --target fuzz_readers write_seeds
+	@tests/fuzz/run.sh build-fuzz $(FUZZ_SECONDS) $(FUZZ_SEED) $(FUZZ_TARGETS)
 
 # Version 14, Debian 12's: other versions write other lines.
 clang_format = $(firstword $(shell command -v clang-format-14 clang-format))

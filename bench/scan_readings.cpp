@@ -71,6 +71,8 @@ void report(const std::string& name, const std::string& pose, const std::string&
     found = registration::examine_readings(scan, shapes);
     if (found.better) verdict = "refused", by = found.better->words;
     if (!found.better && found.side_unverified()) by = "side unverified";
+    if (!found.better && found.head_unverified())
+      by = found.side_unverified() ? "side and upper end unverified" : "upper end unverified";
     if (!found.better) calibration::check_placement(scan, *shapes.front().skin, muscle, "scan");
   } catch (const InputError& error) {
     verdict = "refused", by = std::string("placement: ") + error.what();

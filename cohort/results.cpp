@@ -23,11 +23,12 @@ using Ordered = nlohmann::ordered_json;
 constexpr double usual_spread = 0.5;
 
 Json read_json(const fs::path& file) {
+  if (!fs::exists(file)) return nullptr;
+  if (!fs::is_regular_file(file)) throw InputError(fmt::format("{} is no file", file.string()));
   std::ifstream stream(file);
-  if (!stream) return nullptr;
   Json read = Json::parse(stream, nullptr, false);
-  if (read.is_discarded())
-    throw InputError(fmt::format("{} is no JSON; run the stage again that wrote it", file.string()));
+  if (!read.is_object())
+    throw InputError(fmt::format("{} is no JSON object; run the stage again that wrote it", file.string()));
   return read;
 }
 
@@ -87,7 +88,7 @@ Ordered moduli_json(const std::vector<CaseResults>& cases) {
       by_name[known.name].emplace_back(&one, std::move(known));
   Ordered list = Ordered::array();
   for (const auto& [name, known] : by_name) {
-    const auto population = [&known](const CaseResults* left_out) {
+    const auto population = [&known = known](const CaseResults* left_out) {
       std::vector<Likelihood> patients;
       for (const auto& [one, number] : known)
         if (one != left_out) patients.push_back(number.likelihood);
@@ -191,6 +192,13 @@ Json at(const Json& from, const std::string& pointer) {
   return from.is_object() && from.contains(path) ? from.at(path) : Json(nullptr);
 }
 
+/// The same of what is a number or is not there. @throws Json::exception  it is something else
+Json number_at(const Json& from, const std::string& pointer) {
+  Json value = at(from, pointer);
+  if (!value.is_null()) value = value.get<double>();
+  return value;
+}
+
 /// Columns of the table: name, and what stands there for a case.
 using Row = std::map<std::string, Json>;
 
@@ -203,12 +211,12 @@ Row row_of(const CaseResults& one) {
   for (const Json& effect : one.diagnosis.is_object() ? one.diagnosis.value("missing", Json::array()) : Json::array())
     missing += (missing.empty() ? "" : " ") + effect.get<std::string>();
   row["missing"] = missing;
-  row["unexplained_mm"] = at(one.diagnosis, "/unexplained_mm");
-  row["unexplained_low_mm"] = at(one.diagnosis, "/unexplained95/0");
-  row["unexplained_high_mm"] = at(one.diagnosis, "/unexplained95/1");
-  row["mae_study_mm"] = at(one.comparison, "/mae_study_mm");
-  row["rms_mm"] = at(one.comparison, "/rms_mm");
-  row["calibrated_rms_mm"] = at(one.calibration, "/rms_mm");
+  row["unexplained_mm"] = number_at(one.diagnosis, "/unexplained_mm");
+  row["unexplained_low_mm"] = number_at(one.diagnosis, "/unexplained95/0");
+  row["unexplained_high_mm"] = number_at(one.diagnosis, "/unexplained95/1");
+  row["mae_study_mm"] = number_at(one.comparison, "/mae_study_mm");
+  row["rms_mm"] = number_at(one.comparison, "/rms_mm");
+  row["calibrated_rms_mm"] = number_at(one.calibration, "/rms_mm");
   for (const Json& p :
        one.calibration.is_object() ? one.calibration.value("parameters", Json::array()) : Json::array()) {
     const std::string name = p.at("name");
@@ -259,7 +267,8 @@ Ordered pooled(const std::vector<CaseResults>& cases, const PoolOptions& options
     if (!one.diagnosis.is_object()) continue;
     ++diagnosed;
     without_singles += !one.diagnosis.contains("singles");
-    const std::string verdict = one.diagnosis.value("verdict", "");
+    const auto verdict =
+        reading(one, "diagnosis.json", [&one = one] { return one.diagnosis.value("verdict", std::string()); });
     verdicts[verdict] = verdicts.value(verdict, 0) + 1;
   }
   return {{"patients", cases.size()},
@@ -287,7 +296,8 @@ std::string table_csv(const std::vector<CaseResults>& cases) {
   std::vector<Row> rows;
   std::set<std::string> others;
   for (const CaseResults& one : cases) {
-    rows.push_back(reading(one, "*.json", [&one = one] { return row_of(one); }));
+    rows.push_back(
+        reading(one, "comparison.json, calibration.json or diagnosis.json", [&one = one] { return row_of(one); }));
     for (const auto& [column, value] : rows.back())
       if (std::find(first.begin(), first.end(), column) == first.end()) others.insert(column);
   }

@@ -63,7 +63,10 @@ Landmarks read_landmarks(const std::filesystem::path& file, const std::string& f
   std::string line;
   const std::vector<std::string> plain = {"name", "x", "y", "z"}, with_sigma = {"name", "x", "y", "z", "sigma_mm"};
   std::vector<std::string> header;
-  if (std::getline(stream, line)) header = split(line);
+  if (std::getline(stream, line)) {
+    if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);  // the mark that spreadsheets put before UTF-8
+    header = split(line);
+  }
   const bool states_sigma =
       header.size() >= with_sigma.size() && std::equal(with_sigma.begin(), with_sigma.end(), header.begin());
   if (header != plain && !states_sigma)

@@ -67,9 +67,9 @@ void check_survivable(const std::filesystem::path& file, const std::function<voi
     throw InputError(fmt::format(
         "{}: damaged: its counts ask for more memory than a file of its size can fill; copy or write the file again",
         file.string()));
-  if (!WIFSIGNALED(status)) return;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
   throw InputError(
-      WTERMSIG(status) == SIGALRM
+      WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM
           ? fmt::format("{}: damaged: reading it does not end in {} s; copy or write the file again", file.string(),
                         longest_s)
           : fmt::format("{}: damaged: its reader is brought down by it; copy or write the file again", file.string()));

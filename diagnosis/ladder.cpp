@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/ladder.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "common/error.h"
 #include "common/rms.h"
+#include "diagnosis/range_ends.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -93,6 +96,10 @@ Ladder climb(const Subject& subject, const ExamineOptions& options, const Findin
     Subject with = with_effect(examined, *found, added);
     try {
       std::unique_ptr<Findings> after = examine(with, options);
+      if (const auto ends = measurements_at_end(*after); !ends.empty()) {
+        ladder.stopped = fmt::format("with {} the fit drives {} to an end of its range", added, ends.front().name);
+        return ladder;
+      }
       Rung rung = rung_of(*after, added, found->included.front().probability);
       rung.refit_only = figures_of(*found, ladder.rungs.back().added);
       rung.random_other = random_other(examined, *found, options.seed + static_cast<unsigned>(ladder.rungs.size()));

@@ -2,9 +2,11 @@
 #include "meshing/mesh_io.h"
 
 #include <fmt/format.h>
+#include <vtkCallbackCommand.h>
 #include <vtkCellArray.h>
 #include <vtkCellData.h>
 #include <vtkDoubleArray.h>
+#include <vtkExecutive.h>
 #include <vtkFieldData.h>
 #include <vtkIdTypeArray.h>
 #include <vtkIntArray.h>
@@ -132,7 +134,12 @@ void write_grid(vtkUnstructuredGrid& grid, const std::filesystem::path& file) {
   writer->SetDataModeToAppended();
   writer->EncodeAppendedDataOff();
   writer->SetCompressorTypeToZLib();
-  if (writer->Write() != 1 || writer->GetErrorCode() != 0) throw InputError(refusal);
+  vtkNew<vtkCallbackCommand> unheard;  // VTK's pages, should the disk become full
+  writer->AddObserver(vtkCommand::ErrorEvent, unheard);
+  writer->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, unheard);
+  const bool written = writer->Write() == 1 && writer->GetErrorCode() == 0;
+  writer->GetExecutive()->RemoveAllObservers();
+  if (!written) throw InputError(refusal);
 }
 
 void check_rows(const std::string& name, Eigen::Index rows, Eigen::Index wanted, const char* of) {

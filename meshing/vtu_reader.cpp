@@ -17,6 +17,9 @@
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLUnstructuredGridReader.h>
 
+#include <cmath>
+#include <limits>
+
 #include "common/error.h"
 #include "common/trial_process.h"
 #include "meshing/mesh_check.h"
@@ -44,6 +47,14 @@ Table to_table(vtkDataArray& array) {
     for (int k = 0; k < table.cols(); ++k) table(r, k) = array.GetComponent(r, k);
   }
   return table;
+}
+
+/// Numbers that count or name something. @param what  for the message
+Eigen::MatrixXi whole_numbers(const std::filesystem::path& file, const Table& table, const std::string& what) {
+  for (const double value : table.reshaped())
+    if (value != std::floor(value) || std::abs(value) > std::numeric_limits<int>::max())
+      throw InputError(fmt::format("{}: {} holds {}; whole numbers are expected", file.string(), what, value));
+  return table.cast<int>();
 }
 
 }  // namespace
@@ -122,14 +133,21 @@ Table VtuReader::cell_column(const std::string& name) const {
   return to_table(*array);
 }
 
-void VtuReader::check_nodes(long long cell, const Indices& of_cell, int wanted) const {
-  if (of_cell.cols() != wanted)
-    throw InputError(
-        fmt::format("{}: cell {} has {} nodes; its kind has {}", file_.string(), cell, of_cell.cols(), wanted));
-  const auto points = static_cast<int>(grid_->vtk->GetNumberOfPoints());
-  for (const int node : of_cell.reshaped())
+Indices VtuReader::nodes_of(long long cell, int wanted) const {
+  vtkNew<vtkIdList> nodes;
+  grid_->vtk->GetCellPoints(cell, nodes);
+  if (nodes->GetNumberOfIds() != wanted)
+    throw InputError(fmt::format("{}: cell {} has {} nodes; its kind has {}", file_.string(), cell,
+                                 nodes->GetNumberOfIds(), wanted));
+  const vtkIdType points = grid_->vtk->GetNumberOfPoints();
+  Indices of_cell(1, wanted);
+  for (int k = 0; k < wanted; ++k) {
+    const vtkIdType node = nodes->GetId(k);
     if (node < 0 || node >= points)
       throw InputError(fmt::format("{}: cell {} names node {}, the file has {}", file_.string(), cell, node, points));
+    of_cell(0, k) = static_cast<int>(node);
+  }
+  return of_cell;
 }
 
 void VtuReader::read_topology(TetMesh& mesh) const {
@@ -143,7 +161,6 @@ void VtuReader::read_topology(TetMesh& mesh) const {
   const bool quadratic = grid.GetCellType(0) == VTK_QUADRATIC_TETRA;
   mesh.cells.resize(cells, quadratic ? 10 : 4);
   mesh.faces.resize(count - cells, quadratic ? 6 : 3);
-  vtkNew<vtkIdList> nodes;
   for (vtkIdType c = 0; c < count; ++c) {
     const bool is_tet = c < cells;
     const int wanted =
@@ -153,19 +170,18 @@ void VtuReader::read_topology(TetMesh& mesh) const {
           fmt::format("{}: cell {} is of VTK type {}; {} was expected (tetrahedra, then triangles, of one order)",
                       file_.string(), c, grid.GetCellType(c), wanted));
     }
-    grid.GetCellPoints(c, nodes);
-    Indices of_cell(1, nodes->GetNumberOfIds());
-    for (vtkIdType k = 0; k < nodes->GetNumberOfIds(); ++k) of_cell(0, k) = static_cast<int>(nodes->GetId(k));
-    check_nodes(c, of_cell, static_cast<int>(is_tet ? mesh.cells.cols() : mesh.faces.cols()));
-    (is_tet ? mesh.cells.row(c) : mesh.faces.row(c - cells)) = of_cell;
+    if (is_tet)
+      mesh.cells.row(c) = nodes_of(c, static_cast<int>(mesh.cells.cols()));
+    else
+      mesh.faces.row(c - cells) = nodes_of(c, static_cast<int>(mesh.faces.cols()));
   }
   set_face_cells(mesh);
 }
 
 void VtuReader::read_tissue(TetMesh& mesh) const {
   const Eigen::Index cells = mesh.cells.rows();
-  mesh.tissue = cell_column("tissue").col(0).head(cells).cast<int>();
-  mesh.region = cell_column("region").col(0).tail(mesh.faces.rows()).cast<int>();
+  mesh.tissue = whole_numbers(file_, cell_column("tissue"), "cell array \"tissue\"").col(0).head(cells);
+  mesh.region = whole_numbers(file_, cell_column("region"), "cell array \"region\"").col(0).tail(mesh.faces.rows());
   mesh.fraction = Table::Zero(cells, segmentation::tissue_count);
   for (int t = 0; t < segmentation::tissue_count; ++t) {
     if (!segmentation::is_meshed(static_cast<segmentation::Tissue>(t))) continue;
@@ -183,7 +199,9 @@ void VtuReader::read_muscle(TetMesh& mesh) const {
                     file_.string()));
   }
   mesh.muscle.points = to_table(*points);
-  mesh.muscle.triangles = to_table(*triangles).cast<int>();
+  mesh.muscle.triangles = whole_numbers(file_, to_table(*triangles), "muscle_triangles");
+  if (!mesh.muscle.points.allFinite())
+    throw InputError(fmt::format("{}: muscle_points_mm holds a coordinate that is not finite", file_.string()));
   const auto& rows = mesh.muscle.triangles;
   if (rows.size() > 0 && (rows.minCoeff() < 0 || rows.maxCoeff() >= mesh.muscle.points.rows())) {
     throw InputError(
@@ -213,7 +231,7 @@ void VtuReader::read_supports(TetMesh& mesh) const {
   if (of_triangle == nullptr || of_triangle->GetNumberOfTuples() != mesh.muscle.triangles.rows())
     throw InputError(
         fmt::format("{}: field data muscle_support needs one number per triangle of muscle_triangles", file_.string()));
-  mesh.muscle_support = to_table(*of_triangle).col(0).cast<int>();
+  mesh.muscle_support = whole_numbers(file_, to_table(*of_triangle), "muscle_support").col(0);
   if (mesh.muscle_support.minCoeff() < 0 ||
       mesh.muscle_support.maxCoeff() >= static_cast<int>(mesh.support_names.size()))
     throw InputError(

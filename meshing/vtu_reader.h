@@ -28,7 +28,7 @@ class VtuReader {
  private:
   struct Grid;
   Table cell_column(const std::string& name) const;
-  void check_nodes(long long cell, const Indices& of_cell, int wanted) const;
+  Indices nodes_of(long long cell, int wanted) const;  ///< 1 by wanted
   void read_muscle(TetMesh& mesh) const;
   void read_topology(TetMesh& mesh) const;
   void read_tissue(TetMesh& mesh) const;

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <sstream>
 
@@ -161,8 +162,9 @@ bool is_corners(const PlyElement& element, const PlyProperty& property) {
 std::vector<int> read_list(Numbers& numbers, const PlyProperty& property, bool corners, long long vertices,
                            const std::filesystem::path& file) {
   const double count = numbers.next(*type_of(property.count_type));
+  constexpr double most = std::numeric_limits<std::uint32_t>::max();
   const double least = corners ? least_corners : 0;
-  if (!(count >= least) || count != std::floor(count))
+  if (!(count >= least && count <= most) || count != std::floor(count))
     throw InputError(fmt::format("{}: {}: {} {} (at least {})", file.string(), numbers.place(),
                                  corners ? "a face of this many corners:" : "a list this long:", count, least));
   std::vector<int> face;
@@ -222,6 +224,9 @@ void read_element(const std::vector<std::string>& w, const std::filesystem::path
   if (count < 0)
     throw InputError(fmt::format("{}: line {} of the header: the count of an element is not a whole number",
                                  file.string(), header.lines));
+  if (element_of(header, w[1]) != nullptr)
+    throw InputError(
+        fmt::format("{}: line {} of the header: element {} stands twice", file.string(), header.lines, w[1]));
   header.elements.push_back({w[1], count, {}});
 }
 

@@ -63,7 +63,8 @@ class VtkErrors {
   std::string text() const {
     std::string text = message_;
     std::replace(text.begin(), text.end(), '\n', ' ');
-    return text;
+    const auto end_of_place = text.find("): ");  // "ERROR: In FILE, line N CLASS (ADDRESS): "
+    return text.starts_with("ERROR: In ") && end_of_place != std::string::npos ? text.substr(end_of_place + 3) : text;
   }
 
  private:
@@ -292,7 +293,7 @@ void write_surface(const Surface& surface, const std::filesystem::path& file,
   writer->SetHeaderTypeToUInt64();
   const VtkErrors errors(*writer);
   if (writer->Write() == 0 || errors.any())
-    throw InputError(fmt::format("{}: cannot be written: {}", file.string(), errors.text()));
+    throw InputError(fmt::format("{}: cannot be written (disk full, or no permission?)", file.string()));
 }
 
 }  // namespace supine::reconstruction

@@ -4,9 +4,12 @@
 #include <fmt/core.h>
 
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <vector>
 
 #include "common/error.h"
@@ -49,6 +52,25 @@ void check_obj_index(const std::string& token, long long vertices, const std::fi
   if (index == 0 || index > vertices || -index > vertices)
     throw InputError(
         fmt::format("{}: line {}: face names vertex {}, the file has {}", file.string(), line, index, vertices));
+}
+
+// Readers of other libraries stop at the comma of a decimal one, and say nothing.
+void check_coordinates(const std::vector<std::string>& words, const std::filesystem::path& file, long long line) {
+  for (std::size_t i = 1; i <= 3; ++i) {
+    double value = std::nan("");
+    const std::string word = i < words.size() ? words[i] : "";
+    const char *begin = word.data() + (word.starts_with('+') ? 1 : 0), *end = word.data() + word.size();
+    const auto parsed = std::from_chars(begin, end, value);
+    if (parsed.ec == std::errc() && parsed.ptr == end && std::isfinite(value)) continue;
+    throw InputError(fmt::format("{}: line {}: a vertex needs three finite numbers, and \"{}\" is none{}",
+                                 file.string(), line, word,
+                                 word.find(',') == std::string::npos ? "" : "; decimals are written with a point"));
+  }
+}
+
+std::vector<std::string> parted_by_blanks(const std::string& line) {
+  std::istringstream in(line);
+  return {std::istream_iterator<std::string>(in), {}};
 }
 
 void declare_frame(const std::string& frame, const std::filesystem::path& file, Declaration& declaration) {
@@ -102,8 +124,12 @@ Declaration inspect_stl(const std::filesystem::path& file) {
   std::string line, last;
   std::getline(in, line);
   read_declaration(line, file, declaration);
-  while (std::getline(in, line))
-    if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
+  for (long long row = 2; std::getline(in, line); ++row) {
+    const std::vector<std::string> w = parted_by_blanks(line);
+    if (w.empty()) continue;
+    last = line;
+    if (w[0] == "vertex") check_coordinates(w, file, row);
+  }
   const std::vector<std::string> w = words(last);
   if (w.empty() || w[0] != "endsolid")
     throw InputError(fmt::format("{}: cut short: an STL text ends with \"endsolid\"", file.string()));
@@ -114,8 +140,10 @@ Declaration inspect_obj(const std::filesystem::path& file) {
   Declaration declaration;
   long long vertices = 0;
   std::string line;
+  long long read = 0;
   for (std::ifstream in = open(file); std::getline(in, line);) {
-    if (line.compare(0, 2, "v ") == 0) ++vertices;
+    ++read;
+    if (line.compare(0, 2, "v ") == 0) check_coordinates(parted_by_blanks(line), file, read), ++vertices;
     if (line.compare(0, 1, "#") == 0) read_declaration(line, file, declaration);
   }
   if (vertices == 0) throw InputError(fmt::format("{}: has no vertices (lines that begin with v)", file.string()));
@@ -124,6 +152,8 @@ Declaration inspect_obj(const std::filesystem::path& file) {
     ++row;
     if (line.compare(0, 2, "f ") != 0) continue;
     const std::vector<std::string> w = words(line);
+    if (w.size() < 4)
+      throw InputError(fmt::format("{}: line {}: a face of {} corners (at least 3)", file.string(), row, w.size() - 1));
     for (std::size_t i = 1; i < w.size(); ++i) check_obj_index(w[i], vertices, file, row);
   }
   return declaration;

@@ -19,9 +19,8 @@ struct Declaration {
 void read_declaration(std::string_view comment, const std::filesystem::path& file, Declaration& declaration);
 
 /// Checks the text part of a file before the reader proper sees it, which does not notice such damage.
-/// @throws InputError  wrong magic, no vertices, fewer bytes or lines than the header promises (STL), a face that names
-/// a
-///   vertex there is not (OBJ; names the line)
+/// @throws InputError  naming the line: wrong magic, no vertices, a vertex that is not three finite numbers, a face of
+///   two corners or that names a vertex there is not (OBJ), fewer bytes or lines than the header promises (STL)
 Declaration inspect_stl(const std::filesystem::path& file);
 Declaration inspect_obj(const std::filesystem::path& file);
 

@@ -258,11 +258,13 @@ std::optional<Reading> turned_reading(Bench& bench, bool mirror) {
   return reading_of(best, mirror ? "mirrored, " + axis_change_words(of_best) : turn_words(of_best));
 }
 
-/// Left for right: x negated, which is the patient's left in LPS.
-std::optional<Reading> other_side_reading(Bench& bench) {
-  const Laid best = best_of_starts(bench, {Eigen::Vector3d(-1, 1, 1).asDiagonal().toDenseMatrix()}, turned);
+/// Left for right: x negated, which is the patient's left in LPS. Head for feet: z negated.
+std::optional<Reading> mirrored_reading(Bench& bench, int axis, const char* words) {
+  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
+  signs[axis] = -1;
+  const Laid best = best_of_starts(bench, {signs.asDiagonal().toDenseMatrix()}, turned);
   if (!std::isfinite(best.misfit_mm)) return std::nullopt;
-  return reading_of(best, "mirrored (x negated: left for right)");
+  return reading_of(best, words);
 }
 
 std::optional<Reading> resized_reading(Bench& bench) {
@@ -295,15 +297,18 @@ bool far_better(const Reading& given, const Reading& other) {
 
 }  // namespace
 
-bool Readings::side_unverified() const {
+bool Readings::fits_as_well(const std::optional<Reading>& other) const {
   constexpr double as_well = 1.15, tolerance_mm = 0.1;
-  return mirrored && mirrored->misfit_mm < as_well * given.misfit_mm + tolerance_mm;
+  return other && other->misfit_mm < as_well * given.misfit_mm + tolerance_mm;
 }
 
 Readings examine_readings(const calibration::Scan& scan, const std::vector<PoseShape>& shapes) {
   constexpr double clearly = 0.6;  // a stranger reading must fit that much better than one before it
   Bench bench(scan, shapes.front());
-  Readings found{reading_of(bench.lay({}, as_given), "as given"), other_side_reading(bench), {}};
+  Readings found{reading_of(bench.lay({}, as_given), "as given"),
+                 mirrored_reading(bench, 0, "mirrored (x negated: left for right)"),
+                 mirrored_reading(bench, 2, "mirrored (z negated: head for feet)"),
+                 {}};
   const auto consider = [&](const std::optional<Reading>& other) {
     if (!other || !far_better(found.given, *other)) return;
     if (!found.better || other->misfit_mm < clearly * found.better->misfit_mm) found.better = other;
@@ -315,6 +320,7 @@ Readings examine_readings(const calibration::Scan& scan, const std::vector<PoseS
   }
   consider(shifted_reading(bench));
   consider(found.mirrored);
+  consider(found.upended);
   consider(turned_reading(bench, false));
   consider(turned_reading(bench, true));
   consider(resized_reading(bench));
@@ -335,12 +341,23 @@ std::string check_readings(const Readings& readings, const std::string& pose, bo
                     "scan that only lies elsewhere is laid on the body by supine-register",
                     name, given, readings.better->words, readings.better->misfit_mm, pose));
   }
-  if (landmarks || !readings.side_unverified()) return {};
-  return fmt::format(
-      "the side of the {} scan is not verified: mirrored, left for right, it would fit as well ({:.1f} mm off, as "
-      "given {:.1f} "
-      "mm). Landmarks would tell",
-      pose, readings.mirrored->misfit_mm, readings.given.misfit_mm);
+  constexpr double fits_nothing_mm = 8;
+  if (!(readings.given.misfit_mm <= fits_nothing_mm))
+    throw InputError(
+        fmt::format("{}: does not fit the {} shape ({:.1f} mm off, RMS, bound {:g}, no point counting for more than "
+                    "{:g}), as given or read in any "
+                    "other way. Is it a scan of this body, with axes, unit and triangles as they were measured?",
+                    name, pose, readings.given.misfit_mm, fits_nothing_mm, lost_mm));
+  if (landmarks) return {};
+  std::string doubt;
+  const auto add = [&](const char* what, const char* how, const Reading& other) {
+    doubt += fmt::format(
+        "{}{} of the {} scan is not verified: mirrored, {}, it would fit as well ({:.1f} mm off, as given {:.1f} mm)",
+        doubt.empty() ? "" : "; ", what, pose, how, other.misfit_mm, readings.given.misfit_mm);
+  };
+  if (readings.side_unverified()) add("the side", "left for right", *readings.mirrored);
+  if (readings.head_unverified()) add("the upper end", "head for feet", *readings.upended);
+  return doubt.empty() ? doubt : doubt + ". Landmarks would tell";
 }
 
 }  // namespace supine::registration

@@ -28,10 +28,14 @@ struct Reading {
 struct Readings {
   Reading given;
   std::optional<Reading> mirrored;  ///< left for right; none where nothing of it meets the skin
+  std::optional<Reading> upended;   ///< head for feet; likewise
   std::optional<Reading> better;    ///< fits far better than as given
 
-  /// A scan of the other side would fit as well: its shape does not say which side it is.
-  bool side_unverified() const;
+  /// A scan of the other side, or of one turned head for feet, would fit as well: its shape does not say which it is.
+  bool side_unverified() const { return fits_as_well(mirrored); }
+  bool head_unverified() const { return fits_as_well(upended); }
+
+  bool fits_as_well(const std::optional<Reading>& other) const;
 };
 
 /// The scan as given against itself mirrored, turned by quarters, shifted, in other units or of another size, and
@@ -46,10 +50,11 @@ struct Readings {
 /// @param shapes  first that of the scan's own pose; of others at least the imaged one
 Readings examine_readings(const calibration::Scan& scan, const std::vector<PoseShape>& shapes);
 
-/// Refuses a scan that another reading fits far better.
+/// Refuses a scan that another reading fits far better, and one that fits in none: misfit over 8 mm, of 10 that it can
+/// be.
 /// @param landmarks  whether the scan has landmarks, which say what is left
 /// @return  what a person should know of it; empty: nothing
-/// @throws InputError  naming the reading, both misfits and what to do
+/// @throws InputError  naming the reading, the misfits and what to do
 std::string check_readings(const Readings& readings, const std::string& pose, bool landmarks, const std::string& name);
 
 }  // namespace supine::registration

@@ -69,12 +69,13 @@ std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParamet
     const auto value = [&](double at) {
       return parameters.value(i, std::clamp(at, parameters.lower()[i], parameters.upper()[i]));
     };
+    const RangeEnd end = range_end(parameters, refit.fit.u, i);
     const auto at = curved.find(i);
     if (at == curved.end())
-      list.push_back({name, parameters.unit(i), value(u), value(u - reach), value(u + reach)});
+      list.push_back({name, parameters.unit(i), value(u), value(u - reach), value(u + reach), end});
     else
       list.push_back({name, parameters.unit(i), value(at->second.quantile(0.5)), value(at->second.quantile(0.025)),
-                      value(at->second.quantile(0.975))});
+                      value(at->second.quantile(0.975)), end});
   }
   return list;
 }
@@ -121,17 +122,23 @@ Curved curved_strengths(const RefitGround& ground, const std::vector<Candidate>&
   return curved;
 }
 
-bool is_at_border(const Refit& refit, const FreeParameters& parameters) {
-  constexpr double close = 0.01;  // of the range
-  for (Index i = 0; i < parameters.size(); ++i) {
-    if (!simulation::find_parameter(parameters.names()[static_cast<std::size_t>(i)])->shape) continue;
-    const double low = parameters.lower()[i], high = parameters.upper()[i], u = refit.fit.u[i];
-    if (std::min(u - low, high - u) < close * (high - low)) return true;
-  }
-  return false;
+/// Whether a place or width ended at the border of its range.
+bool is_at_border(const std::vector<FittedParameter>& fitted) {
+  return std::any_of(fitted.begin(), fitted.end(), [](const FittedParameter& p) {
+    return simulation::find_parameter(p.name)->shape && p.end != RangeEnd::none;
+  });
 }
 
 }  // namespace
+
+RangeEnd range_end(const FreeParameters& parameters, const VectorXd& u, Index i) {
+  constexpr double close = 0.01;  // of the range
+  const double low = parameters.lower()[i], high = parameters.upper()[i], near = close * (high - low);
+  if (high - u[i] < near) return RangeEnd::upper;
+  const auto& row = *simulation::find_parameter(parameters.names()[static_cast<std::size_t>(i)]);
+  const bool absent_there = row.one_sided && !row.shape;
+  return u[i] - low < near && !absent_there ? RangeEnd::lower : RangeEnd::none;
+}
 
 simulation::EffectSetting free_setting(const std::string& name) {
   constexpr double least_share = 1e-3;  // of the usual size: where the logarithm of a strength ends
@@ -178,7 +185,7 @@ Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& gi
   const Curved curved = curved_strengths({scene, base, errors.metric(), nuisances}, candidates, parameters, result);
   result.model = FreeParameters(model).model(result.fit.u);
   result.parameters = parameters_of(result, parameters, curved);
-  result.at_border = is_at_border(result, parameters);
+  result.at_border = is_at_border(result.parameters);
   result.rms_mm =
       rms(distances_at_posterior(base, result.hypothesis, result.fit.residuals).head(result.fit.residuals.skin_rows()));
   result.held_out_rms_mm = held_out_rms(base, result.hypothesis, result.fit.residuals);

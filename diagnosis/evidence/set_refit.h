@@ -8,10 +8,18 @@
 
 namespace supine::diagnosis {
 
+/// An end of the range of a parameter.
+enum class RangeEnd { none, lower, upper };
+
+/// The end that coordinate @p i of a fit lies at, within a hundredth of the range. The lower end of a
+/// strength of one sign is where it is not there: none.
+RangeEnd range_end(const calibration::FreeParameters& parameters, const Eigen::VectorXd& u, Eigen::Index i);
+
 /// A parameter of a refit, with its 95 % interval, cut at its range.
 struct FittedParameter {
   std::string name, unit;
   double value, low, high;
+  RangeEnd end = RangeEnd::none;  ///< where the fit ended
 };
 
 /// A set of effects added to the model, and everything free fitted again through the whole chain.

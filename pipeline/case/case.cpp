@@ -5,7 +5,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 
 #include "common/error.h"
 #include "common/suggestion.h"
@@ -96,6 +99,9 @@ Pose read_pose(const TomlReader& reader, const std::string& name, const Case& re
 }
 
 void check_pose_name(const TomlReader& poses, const std::string& name) {
+  constexpr std::size_t longest = 60;
+  if (name.size() > longest)
+    poses.fail(name, fmt::format("a pose names files: at most {} characters, not {}", longest, name.size()));
   const bool plain = std::all_of(name.begin(), name.end(),
                                  [](unsigned char c) { return (c < 128 && std::isalnum(c)) || c == '_' || c == '-'; });
   if (!plain || name.empty()) poses.fail(name, "a pose names files: use letters, digits, _ and - only");
@@ -118,6 +124,34 @@ void check_directions_differ(const TomlReader& poses, const Case& result) {
                  fmt::format("is the same direction as in [pose.{}] (within {} rad); a second pose needs another load",
                              all[j].name, same_direction_rad));
     }
+}
+
+/// Whether two files hold the same bytes.
+bool same_content(const fs::path& a, const fs::path& b) {
+  std::error_code none;
+  if (fs::equivalent(a, b, none)) return true;
+  if (!fs::is_regular_file(a) || !fs::is_regular_file(b) || fs::file_size(a) != fs::file_size(b)) return false;
+  std::ifstream first(a, std::ios::binary), second(b, std::ios::binary);
+  return std::equal(std::istreambuf_iterator<char>(first), {}, std::istreambuf_iterator<char>(second));
+}
+
+/// A body that lies otherwise has another shape: one file for two poses is in one of them by mistake.
+void check_files_differ(const TomlReader& poses, const Case& result) {
+  const auto check = [&](const char* key, std::optional<fs::path> Pose::*file) {
+    for (const Pose& pose : result.poses)
+      for (const Pose* before = result.poses.data(); before != &pose; ++before)
+        if (pose.*file && before->*file && same_content(*(pose.*file), *(before->*file)))
+          poses.sub_table(pose.name)->fail(
+              key,
+              fmt::format("holds the same as that of [pose.{}]; each pose has a measurement of its own", before->name));
+  };
+  check("surface", &Pose::surface);
+  check("landmarks", &Pose::landmarks);
+}
+
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
 }
 
 /// The imaged one and supine first, as far as they must be there or are, the others as they stand in the file.
@@ -148,9 +182,13 @@ void read_poses(const TomlReader& file, Case& result) {
                   fmt::format("table [pose.{}] is missing: [image] pose names it as the pose that was imaged", name));
     if (!pose) poses->fail(name, fmt::format("table [pose.{}] is missing", name));
     check_pose_name(*poses, name);
+    for (const Pose& before : result.poses)
+      if (lower_case(before.name) == lower_case(name))
+        poses->fail(name, fmt::format("differs from [pose.{}] in capitals only; give it another name", before.name));
     result.poses.push_back(read_pose(*pose, name, result));
   }
   check_directions_differ(*poses, result);
+  if (!result.is_object()) check_files_differ(*poses, result);
 }
 
 void read_landmark_table(const TomlReader& file, Case& result) {

@@ -29,9 +29,11 @@ const Json& told_to(const std::string& patient, const Json& row, bool& left_out)
 
 void set_prior(const fs::path& file, const std::string& name, const Json& told, simulation::Setting& setting) {
   const double median = told.at("median"), log_sd = told.at("log_sd");
-  if (!(median > 0 && median >= setting.lower && median <= setting.upper && log_sd > 0))
-    throw InputError(fmt::format("{}: {} has the median {} and the log_sd {}; the model allows {} to {}, log_sd > 0",
-                                 file.string(), name, median, log_sd, setting.lower, setting.upper));
+  constexpr double widest = 5;  // a factor of 150: no population
+  if (!(median > 0 && median >= setting.lower && median <= setting.upper && log_sd > 0 && log_sd <= widest))
+    throw InputError(
+        fmt::format("{}: {} has the median {} and the log_sd {}; the model allows {} to {}, and a log_sd of 0 to {}",
+                    file.string(), name, median, log_sd, setting.lower, setting.upper, widest));
   setting.value = median;
   setting.prior_sd = median * std::expm1(log_sd);  // log-sd = ln(1 + prior_sd / value)
 }

@@ -80,7 +80,7 @@ class CalibrateTool : public Tool {
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
     app.add_option("--robust", robust_mm_, "a point further off than this many mm counts linearly")
-        ->check(CLI::PositiveNumber)
+        ->check(above_zero())
         ->capture_default_str();
     app.add_option("--intervals", intervals_,
                    "linear (from the sensitivities, no further runs), or profile (a few refits per parameter and end)")
@@ -90,7 +90,7 @@ class CalibrateTool : public Tool {
         ->check(CLI::Range(0, 10000))
         ->capture_default_str();
     app.add_option("--max-evaluations", max_evaluations_, "cmaes: chain runs at most (the last generation is finished)")
-        ->check(CLI::PositiveNumber)
+        ->check(above_zero())
         ->capture_default_str();
     app.add_option("--map", map_,
                    "runs per axis of a map of the error over the first two free parameters around the answer "

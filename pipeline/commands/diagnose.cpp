@@ -7,12 +7,14 @@
 #include <optional>
 
 #include "common/error.h"
+#include "diagnosis/range_ends.h"
 #include "pipeline/case/case_priors.h"
 #include "pipeline/case/model_file.h"
 #include "pipeline/case/population_priors.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/results/diagnosis_report.h"
 #include "pipeline/results/ladder_report.h"
+#include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 #include "simulation/solve/equilibrium.h"
 
@@ -30,6 +32,26 @@ void warn_of_missing_mesh(Run& run, const diagnosis::NumericalError& error) {
                        : error.finer_failure.empty() ? "a coarser surface gives no answer"
                                                      : "better elements give no answer",
                        why, error.spread_mm));
+}
+
+/// What no measurement errs by is no finding but a wrong file.
+void refuse_wrong_input(const Case& description, const std::vector<diagnosis::MeasurementAtEnd>& ends) {
+  if (ends.empty()) return;
+  std::vector<std::string> scans, numbers;
+  for (const Pose& pose : description.poses)
+    if (pose.surface) scans.push_back(fmt::format("{} ([pose.{}])", pose.surface->filename().string(), pose.name));
+  for (const auto& end : ends) {
+    const simulation::Effect& effect = *simulation::find_effect(end.name.substr(0, end.name.find('.')));
+    numbers.push_back(
+        fmt::format("{} = {:.3g} {} ({}; bound {:g})", end.name, end.value, end.unit, effect.meaning(), end.bound));
+  }
+  throw InputError(
+      fmt::format("{}: fits best with an error of measurement at the end of its range: {}. Nothing is measured so "
+                  "wrong: check surface and "
+                  "gravity of [pose.*], [case] side and frame, the scan's axes and unit, and the labels; a scan that "
+                  "lies elsewhere is "
+                  "laid on the body by supine-register",
+                  fmt::join(scans, ", "), fmt::join(numbers, ", ")));
 }
 
 class DiagnoseTool : public Tool {
@@ -61,15 +83,15 @@ class DiagnoseTool : public Tool {
     app.add_option("--registration-mm", known_.registration_mm,
                    "how well each scan's place is known, 1 sigma per direction, mm; its turn goes with it, 0.75 "
                    "degrees per mm (default: registration_mm of the case, else 2). 0.3 where markers were used")
-        ->check(CLI::NonNegativeNumber);
+        ->check(not_below_zero());
     app.add_option("--segmentation-mm", known_.segmentation_mm,
                    "how well the imaged skin's place is known, 1 sigma, mm (default: segmentation_mm of the case, "
                    "else 0.3)")
-        ->check(CLI::NonNegativeNumber);
+        ->check(not_below_zero());
     app.add_option("--chest-wall-mm", known_.chest_wall_mm,
                    "how far breath may move the muscle between two scans, 1 sigma, mm (default: breath_mm of the "
                    "case, else 1)")
-        ->check(CLI::NonNegativeNumber);
+        ->check(not_below_zero());
     app.add_option("--prior", prior_of_sets_,
                    "probabilities, before anything is measured, that nothing, one, two and three effects are missing: "
                    "four numbers > 0 that add up to 1 (default: 0.5,0.3,0.15,0.05)")
@@ -100,6 +122,7 @@ class DiagnoseTool : public Tool {
     options_.progress = [&live](const std::string& what) { live.show(what); };
     const simulation::Model given = given_model(run, *measured);
     auto found = diagnosis::examine(subject_of(*measured, given, noise), options_);
+    refuse_wrong_input(measured->description, diagnosis::measurements_at_end(*found));
     if (!found->base.numerical)
       run.warn("the mesh is taken to be exact (--no-other-meshes)");
     else

@@ -49,7 +49,15 @@ class ReportTool : public Tool {
     const auto stages = stages_of(measured, collected, places);
     run.stage("shapes");
     Json data = about(measured);
-    data["answer"] = answer_json(answer_of(measured, collected, stages, places));
+    try {
+      data["answer"] = answer_json(answer_of(measured, collected, stages, places));
+    } catch (const Json::exception& error) {
+      throw InputError(
+          fmt::format("{}: diagnosis.json, ladder.json or comparison.json is not as this version writes it ({}); run "
+                      "the stage again that "
+                      "wrote it",
+                      places.out.string(), error.what()));
+    }
     data["stages"] = stages_json(stages);
     data["figures"] = collected.figures;
     data["texts"] = collected.texts;

@@ -95,18 +95,18 @@ class WarpTool : public Tool {
                    "the shape)");
     app.add_option("--spacing", spacing_mm_, "voxels of the results, mm, one number or three along the axes")
         ->expected(1, 3)
-        ->check(CLI::PositiveNumber);
+        ->check(above_zero());
     app.add_option("--interpolation", interpolation_, "of grey volumes: linear, nearest, bspline (cubic)")
         ->check(CLI::IsMember({"nearest", "linear", "bspline"}))
         ->capture_default_str();
     app.add_option("--blend", blend_mm_, "over how many mm what lies outside the body goes along with it")
-        ->check(CLI::NonNegativeNumber)
+        ->check(not_below_zero())
         ->capture_default_str();
     app.add_option("--background", background_,
                    "value where there is nothing to show (default: the volume's least; of labels 0)");
     app.add_option("--grid-mm", grid_mm_,
                    "spacing of the displacement's grid, mm (default: so that it has about 400,000 points)")
-        ->check(CLI::PositiveNumber);
+        ->check(above_zero());
     app.add_flag("--no-transform", no_transform_, "write no displacement and no transform");
   }
 

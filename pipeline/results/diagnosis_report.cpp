@@ -50,7 +50,11 @@ Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, 
   if (refit != nullptr) {
     for (const auto& p : refit->parameters)
       if (p.name.starts_with(candidate.effect + "."))
-        list.push_back({{"name", p.name}, {"value", p.value}, {"unit", p.unit}, {"interval95", {p.low, p.high}}});
+        list.push_back({{"name", p.name},
+                        {"value", p.value},
+                        {"unit", p.unit},
+                        {"interval95", {p.low, p.high}},
+                        {"at_bound", p.end != diagnosis::RangeEnd::none}});
     return list;
   }
   for (Eigen::Index k = 0; k < score.step.size(); ++k) {

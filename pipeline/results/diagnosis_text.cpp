@@ -18,9 +18,14 @@ std::string values_of(const std::vector<diagnosis::FittedParameter>& parameters)
   std::string text;
   for (const auto& p : parameters) {
     const std::string unit = p.unit == "1" ? "" : " " + p.unit;
-    text += fmt::format("{}{} {:.2g} [{:.2g}, {:.2g}]{}", text.empty() ? "" : ", ", p.name.substr(p.name.find('.') + 1),
-                        p.value, p.low, p.high, unit);
-    if (p.name.ends_with(".log_ratio"))
+    text += fmt::format("{}{} ", text.empty() ? "" : ", ", p.name.substr(p.name.find('.') + 1));
+    // At an end of its range a fit knows the other side alone.
+    if (p.end == diagnosis::RangeEnd::none)
+      text += fmt::format("{:.2g} [{:.2g}, {:.2g}]{}", p.value, p.low, p.high, unit);
+    else
+      text += p.end == diagnosis::RangeEnd::upper ? fmt::format("at least {:.2g}{}", p.low, unit)
+                                                  : fmt::format("at most {:.2g}{}", p.high, unit);
+    if (p.end == diagnosis::RangeEnd::none && p.name.ends_with(".log_ratio"))
       text += fmt::format(" (x {:.2g} [{:.2g}, {:.2g}])", std::exp(p.value), std::exp(p.low), std::exp(p.high));
   }
   return text;

@@ -66,6 +66,9 @@ std::string hash_folder(const fs::path& folder) {
 }  // namespace
 
 std::string sha256(const fs::path& file_or_folder) {
+  if (fs::exists(file_or_folder) && !fs::is_directory(file_or_folder) && !fs::is_regular_file(file_or_folder))
+    throw InputError(file_or_folder.string() +
+                     " is neither a file nor a folder but a device or a pipe; copy it to a file");
   return fs::is_directory(file_or_folder) ? hash_folder(file_or_folder) : hash_file(file_or_folder);
 }
 

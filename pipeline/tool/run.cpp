@@ -49,7 +49,7 @@ struct Run::State {
   explicit State(bool force_outputs) : force(force_outputs), outputs(force_outputs) {}
 
   void clear_progress() {
-    if (progress_shown) fmt::print(stderr, "\r\033[K");
+    if (progress_shown) std::fputs("\r\033[K", stderr);
     progress_shown = false;
   }
 
@@ -177,11 +177,13 @@ void Run::finish() {
     if (!stream) throw InputError("writing " + sidecar.target.string() + " failed; check the free space on the disk");
     if (!sidecar.figures.empty()) printed[sidecar.target.filename().string()] = document;
   }
+  state_->clear_progress();
+  if (state_->json) fmt::print("{}\n", printed.size() == 1 ? printed.front().dump(2) : printed.dump(2));
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw InputError("standard output cannot be written (disk full?); nothing was written");
   state_->outputs.commit();
   std::error_code none;
   for (const fs::path& file : state_->no_longer_needed) fs::remove(file, none);
-  state_->clear_progress();
-  if (state_->json) fmt::print("{}\n", printed.size() == 1 ? printed.front().dump(2) : printed.dump(2));
 }
 
 }  // namespace supine::pipeline

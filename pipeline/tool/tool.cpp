@@ -5,8 +5,12 @@
 #include <omp.h>
 
 #include <Eigen/Core>
+#include <charconv>
+#include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <new>
 #include <system_error>
 
@@ -67,12 +71,29 @@ int work(Tool& tool, const CLI::App& app, const CommonOptions& common) {
   return static_cast<int>(outcome);
 }
 
+/// NaN for what is no finite number.
+double number_of(const std::string& text) {
+  double value = std::numeric_limits<double>::quiet_NaN();
+  const auto parsed = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool whole = parsed.ec == std::errc() && parsed.ptr == text.data() + text.size();
+  return whole && std::isfinite(value) ? value : std::numeric_limits<double>::quiet_NaN();
+}
+
 int complain(const Tool& tool, std::string_view message, int code) {
-  fmt::print(stderr, "{}: error: {}\n", tool.name(), message);
+  // No fmt::print: it would throw where standard error is full.
+  std::fputs(fmt::format("{}: error: {}\n", tool.name(), message).c_str(), stderr);
   return code;
 }
 
 }  // namespace
+
+CLI::Validator above_zero() {
+  return {[](const std::string& text) { return number_of(text) > 0 ? "" : text + " is no number above 0"; }, "> 0"};
+}
+
+CLI::Validator not_below_zero() {
+  return {[](const std::string& text) { return number_of(text) >= 0 ? "" : text + " is no number from 0 up"; }, ">= 0"};
+}
 
 int tool_main(Tool& tool, int argc, char** argv) {
   use_fitting_settings(argv);
@@ -95,6 +116,9 @@ int tool_main(Tool& tool, int argc, char** argv) {
     return complain(tool, error.what(), exit_bad_input);
   } catch (const NumericalFailure& error) {
     return complain(tool, error.what(), exit_numerical_failure);
+  } catch (const std::filesystem::filesystem_error& error) {
+    return complain(tool, fmt::format("{}: {}; nothing was written", error.path1().string(), error.code().message()),
+                    exit_bad_input);
   } catch (const std::system_error& error) {  // files, and standard output that is full
     return complain(tool, fmt::format("{}; nothing was written", error.what()), exit_bad_input);
   } catch (const std::bad_alloc&) {

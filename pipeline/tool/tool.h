@@ -62,6 +62,10 @@ class Run {
   int threads_;
 };
 
+/// Checks of an option that is one finite number: above zero; zero or more.
+CLI::Validator above_zero();
+CLI::Validator not_below_zero();
+
 /// A command-line tool. Declares its options, then runs once.
 class Tool {
  public:

@@ -71,7 +71,9 @@ std::optional<Slice> read_header(const fs::path& file) {
   };
   const auto whole = [&](std::uint16_t group, std::uint16_t element, int absent) {
     const auto values = numbers(text(group, element));
-    return values.empty() ? absent : static_cast<int>(values.front());
+    constexpr double most = 1e9;  // no count of rows or frames
+    return values.empty() || !std::isfinite(values.front()) ? absent
+                                                            : static_cast<int>(std::clamp(values.front(), -most, most));
   };
   Slice slice;
   slice.file = file;
@@ -155,6 +157,12 @@ void check_slice(const Slice& s) {
     refuse(s,
            "the slice does not say where it lies: image position (0020,0032), orientation (0020,0037) or pixel "
            "spacing (0028,0030) is missing (a scout or a derived picture?); choose another series");
+  for (const auto* numbers : {&s.position, &s.orientation, &s.spacing})
+    for (const double number : *numbers)
+      if (!std::isfinite(number))
+        refuse(s,
+               "image position (0020,0032), orientation (0020,0037) or pixel spacing (0028,0030) is not a finite "
+               "number: damaged; copy it again");
 }
 
 /// All of one size, orientation, spacing and frame of reference.

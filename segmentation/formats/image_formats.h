@@ -35,4 +35,11 @@ std::optional<Eigen::Vector3d> signs_to_lps(const std::string& frame);
 /// @throws InputError  when an axis has no voxel or there are more than 2^31 voxels in all
 void check_size(const std::filesystem::path& file, const Eigen::Vector3i& size);
 
+/// A header that promises more voxels than the file can hold is noticed before memory is asked for.
+/// @param promised  bytes of voxels
+/// @param there     bytes of the file, or of what may hold voxels in it
+/// @param packed    whether they are deflated (gzip, zlib)
+/// @throws InputError
+void check_holdable(const std::filesystem::path& file, std::size_t promised, std::uintmax_t there, bool packed);
+
 }  // namespace supine::segmentation::formats

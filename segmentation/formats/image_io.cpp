@@ -120,6 +120,15 @@ void check_size(const std::filesystem::path& file, const Eigen::Vector3i& size) 
                                  file.string(), size.x(), size.y(), size.z()));
 }
 
+void check_holdable(const std::filesystem::path& file, std::size_t promised, std::uintmax_t there, bool packed) {
+  constexpr std::uintmax_t most_deflated = 1032;  // bytes that one byte of deflated data can stand for (zlib.net)
+  if (promised <= there || (packed && promised / most_deflated <= there)) return;
+  throw InputError(fmt::format(
+      "{}: its header promises {} bytes of voxels, more than its {} bytes {}can hold: truncated or damaged; "
+      "copy the file again",
+      file.string(), promised, there, packed ? "of compressed data " : ""));
+}
+
 }  // namespace formats
 
 ImageFile formats::finish(const std::filesystem::path& file, RawImage raw, const std::string& case_frame) {

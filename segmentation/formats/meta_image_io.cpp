@@ -51,7 +51,7 @@ std::vector<double> Header::numbers(std::initializer_list<const char*> keys, std
     }
     double number = 0;
     const auto parsed = std::from_chars(at, end, number);
-    if (parsed.ec != std::errc()) break;
+    if (parsed.ec != std::errc() || !std::isfinite(number)) break;
     result.push_back(number);
     at = parsed.ptr;
   }
@@ -132,12 +132,16 @@ std::vector<std::byte> read_bytes(const Header& header, std::size_t wanted) {
   const std::streamoff size = stream.tellg();
   const bool compressed = header.flag({"CompressedData"});
   std::streamoff start = local ? header.data_start : 0;
-  if (const auto skip = header.numbers({"HeaderSize"}, 1); !skip.empty())
+  if (const auto skip = header.numbers({"HeaderSize"}, 1); !skip.empty()) {
+    if (!(skip[0] >= -1 && skip[0] <= static_cast<double>(size)))
+      header.refuse("HeaderSize", fmt::format("-1, or 0 to the size of the file ({} bytes)", size));
     start = skip[0] < 0 ? size - static_cast<std::streamoff>(wanted) : start + static_cast<std::streamoff>(skip[0]);
+  }
   if (start < 0 || start > size || (!compressed && static_cast<std::size_t>(size - start) < wanted))
     throw InputError(fmt::format("{}: {} bytes of voxel data expected, {} found: truncated; copy the file again",
                                  data_file.string(), wanted,
                                  std::max<std::streamoff>(0, size - std::max<std::streamoff>(0, start))));
+  check_holdable(data_file, wanted, static_cast<std::uintmax_t>(size - start), compressed);
   std::vector<std::byte> bytes(compressed ? static_cast<std::size_t>(size - start) : wanted);
   stream.seekg(start);
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <memory>
 
@@ -185,9 +186,14 @@ RawImage read_nifti(const std::filesystem::path& file) {
     image.grid.size[a] = static_cast<int>(std::clamp<std::int64_t>(h.dim[a + 1], 0, 2000000000));
   check_size(file, image.grid.size);
   place(file, h, image);
+  const std::size_t wanted = image.grid.count() * size_of(type);
+  check_holdable(file, wanted, std::filesystem::file_size(file), gzdirect(stream.get()) == 0);
+  if (!(h.data_offset >= 0 && h.data_offset < std::numeric_limits<z_off_t>::max() / 2))
+    throw InputError(
+        fmt::format("{}: vox_offset is {}; the voxels must begin behind the header", file.string(), h.data_offset));
   if (gzseek(stream.get(), static_cast<z_off_t>(h.data_offset), SEEK_SET) < 0)
     throw InputError(fmt::format("{}: vox_offset {} lies beyond the end of the file", file.string(), h.data_offset));
-  std::vector<std::byte> bytes(image.grid.count() * size_of(type));
+  std::vector<std::byte> bytes(wanted);
   read_exactly(stream.get(), file, bytes.data(), bytes.size());
   image.voxels = to_floats(bytes, type, h.big_endian);
   if (h.slope != 0 && (h.slope != 1 || h.intercept != 0))

@@ -2,15 +2,26 @@
 #include <fmt/format.h>
 #include <teem/nrrd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <limits>
 #include <memory>
 
 #include "common/error.h"
+#include "common/trial_process.h"
+#include "segmentation/formats/data_file.h"
 #include "segmentation/formats/image_formats.h"
 
 namespace supine::segmentation::formats {
 namespace {
+
+struct IoStateDeleter {
+  void operator()(NrrdIoState* state) const { nrrdIoStateNix(state); }
+};
+using IoState = std::unique_ptr<NrrdIoState, IoStateDeleter>;
 
 struct NrrdDeleter {
   void operator()(Nrrd* nrrd) const { nrrdNuke(nrrd); }
@@ -88,19 +99,76 @@ void read_axes(const std::filesystem::path& file, const Nrrd& nrrd, RawImage& im
   }
 }
 
+/// What holds the voxels: the file itself behind its header, or the file that the header names.
+std::string voxel_bytes(const std::filesystem::path& file) {
+  std::filesystem::path from = file;
+  const auto detached = detached_data_file(file);
+  if (detached) from = *detached;
+  std::ifstream stream(from, std::ios::binary);
+  std::string line;
+  while (!detached && std::getline(stream, line) && !line.empty() && line != "\r") {
+  }
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Teem takes what is left over, or packed otherwise than the header says, without a word: sizes or encoding are wrong
+/// then.
+void check_voxel_bytes(const std::filesystem::path& file, const Nrrd& header, const NrrdIoState& io) {
+  if (io.dataFNArr->len > 1 || io.dataFNFormat != nullptr || io.byteSkip != 0 || io.lineSkip != 0) return;
+  const std::string bytes = voxel_bytes(file);
+  const std::size_t promised = nrrdElementNumber(&header) * nrrdElementSize(&header);
+  const bool gzip = io.encoding == nrrdEncodingGzip, raw = io.encoding == nrrdEncodingRaw;
+  if (gzip && !bytes.starts_with("\x1f\x8b"))
+    throw InputError(fmt::format(
+        "{}: its header says that the voxels are packed (encoding: gzip), and they are not; write the file again",
+        file.string()));
+  if (raw && bytes.size() != promised)
+    throw InputError(
+        fmt::format("{}: its header promises {} bytes of voxels, and {} follow: sizes, type or encoding "
+                    "are not those of the data, or the file is truncated; write the file again",
+                    file.string(), promised, bytes.size()));
+  if (gzip) check_holdable(file, promised, bytes.size(), true);
+  if (!gzip && !raw && io.encoding != nrrdEncodingBzip2 && nrrdElementNumber(&header) > bytes.size())
+    check_holdable(file, nrrdElementNumber(&header), bytes.size(), false);
+}
+
+NrrdPointer load(const std::filesystem::path& file, bool header_only, NrrdIoState& io) {
+  NrrdPointer nrrd(nrrdNew());
+  io.skipData = header_only;
+  if (nrrdLoad(nrrd.get(), file.c_str(), &io) != 0)
+    throw InputError(
+        fmt::format("{}: cannot be read as NRRD (damaged or truncated?): {}", file.string(), teem_error()));
+  return nrrd;
+}
+
+/// Teem does not stand every damaged header, nor every damaged text or bzip2; bytes, plain or deflated, it does.
+void try_loading(const std::filesystem::path& file) {
+  check_survivable(file, [&file] {
+    const IoState io(nrrdIoStateNew());
+    load(file, true, *io);
+    if (io->encoding != nrrdEncodingRaw && io->encoding != nrrdEncodingGzip)
+      load(file, false, *IoState(nrrdIoStateNew()));
+  });
+}
+
 }  // namespace
 
 RawImage read_nrrd(const std::filesystem::path& file) {
-  const NrrdPointer nrrd(nrrdNew());
-  if (nrrdLoad(nrrd.get(), file.c_str(), nullptr) != 0)
-    throw InputError(
-        fmt::format("{}: cannot be read as NRRD (damaged or truncated?): {}", file.string(), teem_error()));
-  check_axes(file, *nrrd);
   RawImage image;
-  image.frame = frame_of(file, *nrrd);
-  for (int a = 0; a < 3; ++a) image.grid.size[a] = static_cast<int>(nrrd->axis[a].size);
-  check_size(file, image.grid.size);
-  read_axes(file, *nrrd, image);
+  try_loading(file);
+  {
+    const IoState io(nrrdIoStateNew());
+    const NrrdPointer header = load(file, true, *io);
+    check_voxel_bytes(file, *header, *io);
+    check_axes(file, *header);
+    image.frame = frame_of(file, *header);
+    for (int a = 0; a < 3; ++a)
+      image.grid.size[a] =
+          static_cast<int>(std::min<std::size_t>(header->axis[a].size, std::numeric_limits<int>::max()));
+    check_size(file, image.grid.size);
+    read_axes(file, *header, image);
+  }
+  const NrrdPointer nrrd = load(file, false, *IoState(nrrdIoStateNew()));
   image.voxels.resize(image.grid.count());
   const auto lookup = nrrdFLookup[nrrd->type];
   for (std::size_t n = 0; n < image.voxels.size(); ++n) image.voxels[n] = lookup(nrrd->data, n);

@@ -182,7 +182,7 @@ void write_labels(const LabelImage& labels, const std::filesystem::path& file, c
   writer->RemoveAllObservers();
   writer->GetExecutive()->RemoveAllObservers();
   if (!written || !errors.message().empty())
-    throw InputError(fmt::format("{}: cannot be written: {}", file.string(), errors.message()));
+    throw InputError(fmt::format("{}: cannot be written (disk full, or no permission?)", file.string()));
 }
 
 LabelImage read_labels(const std::filesystem::path& file) {
@@ -204,6 +204,9 @@ std::vector<float> read_gland_share(const std::filesystem::path& file) {
   update(*reader, file);
   auto* array = vtkFloatArray::SafeDownCast(reader->GetOutput()->GetPointData()->GetArray(share_array));
   if (!array) return {};
+  if (array->GetNumberOfComponents() != 1)
+    throw InputError(fmt::format("{}: array `{}` has {} components; one number a voxel is expected", file.string(),
+                                 share_array, array->GetNumberOfComponents()));
   std::vector<float> share(array->GetPointer(0), array->GetPointer(0) + array->GetNumberOfTuples());
   for (const float value : share)
     if (!(value >= 0 && value <= 1))

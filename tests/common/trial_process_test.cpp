@@ -2,6 +2,7 @@
 #include "common/trial_process.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdlib>
@@ -27,6 +28,10 @@ TEST(TrialProcess, NamesTheFileThatBringsItsReaderDown) {
     } catch (const InputError& error) {
       EXPECT_NE(std::string(error.what()).find("scan.vtp: damaged"), std::string::npos) << error.what();
     }
+}
+
+TEST(TrialProcess, AReaderThatEndsTheProcessIsBroughtDownToo) {
+  EXPECT_THROW(check_survivable("scan.vtp", [] { _exit(77); }), InputError);
 }
 
 TEST(TrialProcess, RefusesCountsThatNoFileOfItsSizeCanHold) {

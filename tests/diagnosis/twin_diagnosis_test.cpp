@@ -9,6 +9,7 @@
 #include "diagnosis/hot_spots.h"
 #include "diagnosis/ladder.h"
 #include "diagnosis/next_measurement.h"
+#include "diagnosis/range_ends.h"
 #include "simulation/parameters.h"
 #include "tests/calibration/twin.h"
 
@@ -232,6 +233,20 @@ TEST(TwinDiagnosis, ARefitSaysThatAPlaceEndsAtTheBorderOfItsRange) {
   };
   EXPECT_TRUE(ends_there(0.55));
   EXPECT_FALSE(ends_there(0.2));
+}
+
+TEST(TwinDiagnosis, AnErrorOfMeasurementAtTheEndOfItsRangeIsNoFindingAndOneInsideIs) {
+  const auto ends = [](const std::string& effect, const std::string& parameter, double value) {
+    return measurements_at_end(*findings_of(Twin({with(effect, parameter, value), noise_mm}), 3));
+  };
+  const auto tilted = ends("gravity_tilt", "roll_rad", 0.9);
+  ASSERT_EQ(tilted.size(), 1u);
+  EXPECT_EQ(tilted[0].name, "gravity_tilt.roll_rad");
+  EXPECT_EQ(tilted[0].bound, 0.6);
+  EXPECT_NEAR(tilted[0].value, 0.6, 0.06);
+  EXPECT_TRUE(ends("gravity_tilt", "roll_rad", 0.3).empty());
+  // The muscle is no measurement: how far it moved at least is a finding.
+  EXPECT_TRUE(ends("chest_wall_motion", "amplitude_mm", 18).empty());
 }
 
 TEST(TwinDiagnosis, ALadderAddsTwoEffectsOneAfterTheOtherAndShowsWhatElseCouldHaveBeenAdded) {

@@ -51,6 +51,7 @@ TEST(ScanReadings, AsItIsFitsAndItsSideIsKnown) {
   EXPECT_LT(found.given.misfit_mm, 0.3);
   EXPECT_FALSE(found.better);
   EXPECT_FALSE(found.side_unverified());
+  EXPECT_FALSE(found.head_unverified());
   EXPECT_EQ(check_readings(found, "supine", false, "scan.ply"), "");
 }
 
@@ -89,6 +90,17 @@ TEST(ScanReadings, AScanOfAnotherPoseIsNamed) {
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("scan.ply: does not fit the supine shape as given"), std::string::npos);
   }
+}
+
+TEST(ScanReadings, AScanThatFitsInNoReadingIsRefused) {
+  Readings none{{"as given", 9.9, 0.2}, {}, {}, {}};
+  EXPECT_THROW(check_readings(none, "supine", true, "scan.ply"), InputError);
+  none.given.misfit_mm = 5;
+  EXPECT_NO_THROW(check_readings(none, "supine", true, "scan.ply"));
+  none.upended = Reading{"mirrored (z negated: head for feet)", 5.2, 0.2};
+  EXPECT_NE(check_readings(none, "supine", false, "scan.ply").find("the upper end of the supine scan is not verified"),
+            std::string::npos);
+  EXPECT_EQ(check_readings(none, "supine", true, "scan.ply"), "") << "landmarks say which end is up";
 }
 
 TEST(ScanReadings, WhereASymmetricBodyDoesNotTellItsSideThatIsSaid) {

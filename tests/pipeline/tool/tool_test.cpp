@@ -2,6 +2,7 @@
 #include "pipeline/tool/tool.h"
 
 #include <csignal>
+#include <cstdio>
 #include <fstream>
 
 #include "common/error.h"
@@ -194,6 +195,30 @@ TEST_F(ToolMain, AnInputThatIsNotThereIsNamed) {
   EXPECT_EQ(call({"/no/such/file", "-o", target()}), 2);
   expect_words(err_, {"/no/such/file"});
   EXPECT_EQ(files_written(), 0u);
+}
+
+TEST_F(ToolMain, StandardOutputThatIsFullIsAnErrorAndNothingIsWritten) {
+  const auto call_with_full_output = [this](const std::vector<std::string>& more) {
+    [[maybe_unused]] const auto* full = std::freopen("/dev/full", "w", stdout);
+    std::vector<std::string> arguments = {in(), "-o", target()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    call_and_exit(arguments);
+  };
+  for (const auto& more : {std::vector<std::string>{"--json"}, std::vector<std::string>{}}) {
+    EXPECT_EXIT(call_with_full_output(more), testing::ExitedWithCode(2), "supine-copy: error: ");
+    EXPECT_EQ(files_written(), 0u);
+  }
+}
+
+TEST_F(ToolMain, ChecksOfNumbersSayWhatIsWanted) {
+  const auto said = [](const CLI::Validator& check, std::string text) { return check(text); };
+  EXPECT_EQ(said(above_zero(), "0.5"), "");
+  EXPECT_EQ(said(above_zero(), "0"), "0 is no number above 0");
+  EXPECT_EQ(said(above_zero(), "nan"), "nan is no number above 0");
+  EXPECT_EQ(said(above_zero(), "1e400"), "1e400 is no number above 0");
+  EXPECT_EQ(said(not_below_zero(), "0"), "");
+  EXPECT_EQ(said(not_below_zero(), "-1"), "-1 is no number from 0 up");
+  EXPECT_EQ(said(not_below_zero(), "1,5"), "1,5 is no number from 0 up");
 }
 
 }  // namespace

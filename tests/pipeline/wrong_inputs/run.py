@@ -11,6 +11,7 @@ README.md says how changes are written.
 """
 import argparse
 import concurrent.futures
+import gzip
 import os
 import pathlib
 import re
@@ -39,6 +40,8 @@ COMMANDS = {
     "model": "show {case}/model.toml",
     "report": "{case} --dir {out} -o {out}/report.html",
     "phantom": "-o {case}/made",
+    "warp": "{case} {case}/labels.nrrd -o {out}/carried",
+    "cohort": "{case}/many -o {out}/pooled",
 }
 
 
@@ -81,6 +84,9 @@ CHANGES = {
     "text": lambda data, argument: quoted(argument)[0].encode(),
     "cut": lambda data, argument: data[:int(len(data) * float(argument.rstrip("%")) / 100)],
     "invert": lambda data, argument: data[:int(argument)] + bytes(255 - b for b in data[int(argument):int(argument) + 8]) + data[int(argument) + 8:],
+    "bytes": lambda data, argument: quoted(argument)[0].encode("latin-1"),
+    "before": lambda data, argument: quoted(argument)[0].encode("latin-1") + data,
+    "gzip": lambda data, argument: gzip.compress(data, mtime=0),
     "crlf": lambda data, argument: data.replace(b"\n", b"\r\n"),
     "map": map_points,
 }
@@ -113,6 +119,9 @@ def change(folder, text, extra):
     file.parent.mkdir(parents=True, exist_ok=True)
     if verb == "remove":
         return shutil.rmtree(file) if file.is_dir() else file.unlink()
+    if verb == "link":
+        file.unlink(missing_ok=True)
+        return file.symlink_to(argument)
     if verb == "folder":
         file.unlink(missing_ok=True)
         return file.mkdir()
