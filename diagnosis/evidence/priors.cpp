@@ -15,6 +15,11 @@ double Priors::scan_shared_in(const std::string& pose) const {
   return own == of_pose.end() ? scan_shared_mm : own->second.scan_shared_mm;
 }
 
+std::optional<double> Priors::independent_points_in(const std::string& pose) const {
+  const auto own = of_pose.find(pose);
+  return own == of_pose.end() ? std::nullopt : own->second.independent_points;
+}
+
 double StrengthPrior::mean() const { return log_normal ? median * std::exp(0.5 * spread * spread) : median; }
 
 double StrengthPrior::sd() const { return log_normal ? mean() * std::sqrt(std::expm1(spread * spread)) : spread; }

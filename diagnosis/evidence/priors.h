@@ -3,6 +3,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "diagnosis/evidence/patchiness.h"
@@ -14,6 +15,7 @@ namespace supine::diagnosis {
 struct KnownOfPose {
   simulation::MeasurementTolerances known;
   double scan_shared_mm;
+  std::optional<double> independent_points = {};  ///< how many the scan is worth; none: all it has
 };
 
 /// What is believed before anything is measured: all that a verdict rests on (docs/diagnosis.md).
@@ -32,6 +34,7 @@ struct Priors {
 
   const simulation::MeasurementTolerances& known_in(const std::string& pose) const;
   double scan_shared_in(const std::string& pose) const;
+  std::optional<double> independent_points_in(const std::string& pose) const;
 };
 
 /// The prior of one number of an effect: normal, or log-normal where only values above null make sense.

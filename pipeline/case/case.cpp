@@ -72,8 +72,19 @@ Known read_known(const TomlReader& reader, const std::string& name, const std::s
   return known;
 }
 
+std::optional<double> read_independent_points(const TomlReader& reader, const Pose& pose) {
+  constexpr double fewest = 10;
+  const auto points = reader.number("independent_points");
+  if (points && !(*points >= fewest))
+    reader.fail("independent_points", fmt::format("must be at least {:g}, not {:g}", fewest, *points));
+  if (points && !pose.noise_mm)
+    reader.fail("independent_points",
+                "needs noise_mm beside it: what points that repeat each other err cannot be seen between neighbours");
+  return points;
+}
+
 Pose read_pose(const TomlReader& reader, const std::string& name, const Case& result) {
-  std::vector<std::string> keys = {"gravity", "surface", "noise_mm", "landmarks"};
+  std::vector<std::string> keys = {"gravity", "surface", "noise_mm", "independent_points", "landmarks"};
   for (const KnownKey& row : known_keys) keys.emplace_back(row.key);
   reader.allow(keys);
   Pose pose;
@@ -87,6 +98,7 @@ Pose read_pose(const TomlReader& reader, const std::string& name, const Case& re
   if (pose.noise_mm && *pose.noise_mm > most_noise_mm)
     reader.fail("noise_mm", fmt::format("must be at most {:g} mm, not {:g}; was it meant in micrometres?",
                                         most_noise_mm, *pose.noise_mm));
+  pose.independent_points = read_independent_points(reader, pose);
   pose.known = read_known(reader, name, result.imaged_pose);
   if (pose.gravity.isZero(0) && name != result.imaged_pose && (!pose.surface || name == "supine"))
     reader.fail("gravity",

@@ -39,6 +39,8 @@ struct Pose {
   std::optional<double> noise_mm;                  ///< 1 sigma along the normal; absent = estimate it
   std::optional<std::filesystem::path> landmarks;  ///< CSV
   Known known;
+  /// How many points that err one by one the scan is worth, as noise_mm errs; absent = as many as it has.
+  std::optional<double> independent_points = {};
 };
 
 /// How supine-register lays a scan on the body.
