@@ -64,6 +64,7 @@ class Follower {
       : subject_(subject), options_(options), found_(found) {}
 
   void run() {
+    if (options_.refits > 0) follow_expected();
     auto most = static_cast<std::size_t>(options_.refits);
     if (!something_stands_out(found_)) most = std::min(most, refits_when_quiet);
     for (std::size_t simpler = 0; !bent_;) {
@@ -161,6 +162,19 @@ class Follower {
     return drawn || first.effects.size() + 1 >= found_.priors.of_sets.size() ? found_.refits.size() : at;
   }
 
+  /// Sets of what was expected, of one effect, then of two.
+  void follow_expected() {
+    std::vector<int> expected;
+    for (int e = 0; e < static_cast<int>(found_.candidates.size()); ++e)
+      if (found_.priors.is_expected(found_.candidates[static_cast<std::size_t>(e)].effect)) expected.push_back(e);
+    for (const int e : expected) follow_one({e});
+    if (expected.size() < 2) return;
+    for (std::size_t at = 0; at < expected.size(); ++at)
+      if (found_.refits[at].solved) draw_from(at);
+    for (std::size_t a = 0; a < expected.size(); ++a)
+      for (std::size_t b = a + 1; b < expected.size(); ++b) follow_one({expected[a], expected[b]});
+  }
+
   void one_at_a_time() {
     for (int e = 0; e < static_cast<int>(found_.candidates.size()); ++e)
       if (is_open(hypothesis_of(found_, {e}))) follow_one({e});
@@ -171,7 +185,8 @@ class Follower {
       return found_.refits[a].hypothesis.ln_evidence > found_.refits[b].hypothesis.ln_evidence;
     });
     if (singles.size() > singles_to_draw_from) singles.resize(singles_to_draw_from);
-    for (const std::size_t at : singles) draw_from(at);
+    for (const std::size_t at : singles)
+      if (std::find(drawn_.begin(), drawn_.end(), at) == drawn_.end()) draw_from(at);
     for (std::size_t further = 0; further < most_further; ++further) {
       if (const std::size_t at = first_to_draw_from(); at < found_.refits.size()) draw_from(at);
       const Hypothesis* next = next_to_refit(found_.hypotheses);

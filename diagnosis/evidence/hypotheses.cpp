@@ -18,12 +18,6 @@ namespace {
 constexpr std::size_t pairs_for_triples = 10;
 constexpr double least_rest = 0.3;  // of the usual size: a shorter secant is no better than the slope
 
-double binomial(std::size_t n, std::size_t k) {
-  double value = 1;
-  for (std::size_t i = 0; i < k; ++i) value *= static_cast<double>(n - i) / static_cast<double>(i + 1);
-  return value;
-}
-
 /// Rows of the nuisances that an effect replaces: those of its own kind that are one for all poses.
 std::vector<int> replaced_by(const JointFit& at, const std::string& effect) {
   std::vector<int> rows;
@@ -86,10 +80,6 @@ int Hypothesis::place_of(const std::string& name) const {
   return -1;
 }
 
-double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t size) {
-  return std::log(priors.of_sets.at(size) / binomial(candidates, size));
-}
-
 void lower_unfollowed(std::vector<Hypothesis>& hypotheses) {
   constexpr double none = std::numeric_limits<double>::infinity();
   double nothing = -none, least[2] = {none, none};  // from the base fit, from refits
@@ -126,15 +116,16 @@ double inclusion(const std::vector<Hypothesis>& hypotheses, int effect) {
 }
 
 Screening::Screening(const BaseFit& base, const std::vector<Candidate>& candidates, const Priors& priors)
-    : priors_(priors), count_(candidates.size()) {
+    : priors_(priors) {
   Directions all = directions_at(base.fit, *base.parameters, base.nuisances, base.clusters);
   base_rows_ = first_rows(all.size());
   for (const Candidate& candidate : candidates) {
+    effects_.push_back(candidate.effect);
     replaced_.push_back(replaced_by(base, candidate.effect));
     of_effect_.push_back(add_candidate(base, base, candidate, all));
   }
   evidence_ = std::make_shared<LinearEvidence>(*base.covariance, base.distances(base.fit.residuals), std::move(all));
-  const int count = static_cast<int>(count_);
+  const int count = static_cast<int>(effects_.size());
   hypotheses_.push_back(weigh({}));
   for (int a = 0; a < count; ++a) hypotheses_.push_back(weigh({a}));
   std::vector<Hypothesis> pairs;
@@ -158,7 +149,7 @@ Screening::Screening(const BaseFit& base, const std::vector<Candidate>& candidat
 
 Hypothesis Screening::weigh(std::vector<int> effects) const {
   Hypothesis h;
-  h.ln_prior = ln_prior_of_set(priors_, count_, effects.size());
+  h.ln_prior = priors_.ln_of_set(effects_, effects);
   h.rows = base_rows_;
   for (const int effect : effects) {
     const auto e = static_cast<std::size_t>(effect);
@@ -187,7 +178,7 @@ std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, c
     h.effects.push_back(
         static_cast<int>(std::find(effects.begin(), effects.end(), further[c].effect) - effects.begin()));
     std::sort(h.effects.begin(), h.effects.end());
-    h.ln_prior = ln_prior_of_set(priors, effects.size(), h.effects.size());
+    h.ln_prior = priors.ln_of_set(effects, h.effects);
     h.rows = exchanged(own, replaced_by(at, further[c].effect), rows[c]);
     h.evidence = evidence;
     h.weighed = evidence->weigh(h.rows);

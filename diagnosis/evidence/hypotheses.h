@@ -41,7 +41,7 @@ class Screening {
   Hypothesis weigh(std::vector<int> effects) const;
 
   Priors priors_;
-  std::size_t count_;
+  std::vector<std::string> effects_;
   std::vector<int> base_rows_;
   std::vector<std::vector<int>> of_effect_, replaced_;  // rows of the directions
   std::shared_ptr<const LinearEvidence> evidence_;
@@ -56,9 +56,6 @@ class Screening {
 std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, const Hypothesis& part,
                                       const std::vector<std::string>& effects, const std::vector<Candidate>& further,
                                       const Priors& priors);
-
-/// ln of the prior of one set of @p size out of @p candidates effects.
-double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t size);
 
 /// What was not followed through the chain is lowered by the smallest fall of the evidence that following showed, and
 /// by the largest that a part of it showed: where lines promise too much of an effect they do so of every set that

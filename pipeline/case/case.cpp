@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/case/case.h"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include "common/suggestion.h"
 #include "common/toml_reader.h"
 #include "pipeline/case/case_image.h"
+#include "simulation/catalogue.h"
 
 namespace supine::pipeline {
 namespace {
@@ -148,6 +149,17 @@ std::vector<std::string> pose_order(const TomlReader& poses, const Case& result)
   return names;
 }
 
+std::vector<std::string> read_expected(const TomlReader& priors) {
+  const auto names = priors.texts("expected").value_or(std::vector<std::string>{});
+  for (const std::string& name : names) {
+    if (simulation::find_effect(name) != nullptr) continue;
+    std::vector<std::string> known;
+    for (const auto* effect : simulation::catalogue()) known.push_back(effect->name());
+    priors.fail("expected", fmt::format("\"{}\" is no effect of the catalogue ({})", name, fmt::join(known, ", ")));
+  }
+  return names;
+}
+
 void read_poses(const TomlReader& file, Case& result) {
   const auto poses = file.sub_table("pose");
   if (!poses && result.is_object()) file.fail("pose", "tables [pose.NAME] are missing: they say how things fall");
@@ -271,9 +283,10 @@ Case read_case(const fs::path& folder) {
   read_calibration(file, result);
   read_register(file, result);
   if (const auto priors = file.sub_table("priors")) {
-    priors->allow({"cohort"});
-    priors->require("cohort");
-    result.cohort = case_path(*priors, "cohort", false);
+    priors->allow({"cohort", "expected"});
+    if (!priors->has("expected")) priors->require("cohort");
+    if (priors->has("cohort")) result.cohort = case_path(*priors, "cohort", false);
+    result.expected = read_expected(*priors);
   }
   return result;
 }

@@ -85,6 +85,7 @@ struct Case {
   std::vector<std::string> calibrated_poses;
   RegisterOn register_on;
   std::optional<std::filesystem::path> cohort;  ///< a population's priors: a cohort.json, exists
+  std::vector<std::string> expected;            ///< effects of the catalogue that are as likely there as not
 
   const Pose& imaged() const { return poses.front(); }
   /// The pose that stands for what is predicted: supine, or the first other than the imaged one.

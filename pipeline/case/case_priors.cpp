@@ -22,6 +22,7 @@ void apply(const std::optional<double>& registration_mm, const std::optional<dou
 
 diagnosis::Priors case_priors(const Case& description, const KnownOptions& options) {
   diagnosis::Priors priors;
+  priors.expected = description.expected;
   if (const auto& said = options.segmentation_mm ? options.segmentation_mm : description.segmentation_mm)
     priors.known.segmentation_mm = *said;
   if (options.chest_wall_mm) priors.known.chest_wall_mm = *options.chest_wall_mm;
