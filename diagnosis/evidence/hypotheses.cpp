@@ -184,7 +184,7 @@ std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, c
     h.weighed = evidence->weigh(h.rows);
     // Where the part's strength is far from linear its evidence is another one than Laplace's.
     h.ln_evidence = h.screened = h.weighed.ln_evidence + part.ln_evidence - part.weighed.ln_evidence;
-    list.push_back(std::move(h));
+    if (std::isfinite(h.ln_evidence)) list.push_back(std::move(h));  // else its slopes there are no numbers
   }
   return list;
 }

@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "common/error.h"
+#include "common/rms.h"
 #include "diagnosis/evidence/base_fit.h"
 
 namespace supine::diagnosis {
@@ -16,6 +17,51 @@ using Eigen::VectorXd;
 constexpr double settled = 0.3;       // of F: a further step gains no more
 constexpr double longest_step = 1.0;  // of a coordinate of a parameter: e
 constexpr int most_halvings = 4;
+constexpr double lost_mm =
+    5;  // rms: further off, closest points may lie on the wrong side of a body as slender as a bar
+constexpr double other_moduli[] = {0.5, 2, 0.7, 1.4, 0.35, 2.8, 0.25, 4};
+
+void solve(calibration::Evaluator& evaluator, const std::vector<std::string>& poses, const JointTrial& at,
+           const simulation::ChainSolution* near, const BaseFit& ground, JointFit& fit) {
+  fit.model = with_nuisances(fit.parameters->model(at.u), at.nuisances, poses);
+  fit.fit.u = at.u;
+  fit.fit.prediction = evaluator.predict(fit.model, near);
+  fit.nuisances = at.nuisances;
+  if (fit.fit.mask.empty()) fit.fit.mask = calibration::points_over_skin(fit.fit.prediction);
+  fit.fit.residuals = calibration::residuals_of(evaluator.scene(), fit.fit.prediction, fit.fit.mask, ground.noise_mm);
+  ++fit.evaluations;
+}
+
+/// Coordinates with every Young's modulus of the base model so many times as stiff.
+VectorXd scaled(const FreeParameters& parameters, VectorXd u, double times) {
+  for (Index i = 0; i < u.size(); ++i)
+    if (parameters.names()[static_cast<std::size_t>(i)].ends_with("young_modulus_kpa"))
+      u[i] = parameters.coordinate(i, times * parameters.value(i, u[i]));
+  return parameters.clamped(u);
+}
+
+/// The first prediction: from moduli at which the body is lost no step leads back, so others are tried there.
+void solve_first(calibration::Evaluator& evaluator, const std::vector<std::string>& poses, const JointTrial& at,
+                 const simulation::ChainSolution* near, const BaseFit& ground, JointFit& fit) {
+  solve(evaluator, poses, at, near, ground, fit);
+  if (rms(fit.fit.residuals.skin_mm()) < lost_mm) return;
+  const calibration::PointMask mask = fit.fit.mask;
+  JointFit best = fit;
+  for (const double times : other_moduli) {
+    JointFit trial = fit;
+    trial.fit.mask = mask;
+    try {
+      solve(evaluator, poses, {scaled(*fit.parameters, at.u, times), at.nuisances}, nullptr, ground, trial);
+    } catch (const NumericalFailure&) {
+      continue;  // no equilibrium with these
+    }
+    fit.evaluations = trial.evaluations;
+    if (rms(trial.fit.residuals.skin_mm()) < rms(best.fit.residuals.skin_mm())) best = std::move(trial);
+  }
+  const int evaluations = fit.evaluations;
+  fit = std::move(best);
+  fit.evaluations = evaluations;
+}
 
 }  // namespace
 
@@ -44,14 +90,11 @@ double JointFitter::objective() const {
 }
 
 void JointFitter::predict(const JointTrial& at, const simulation::ChainSolution* near) {
-  fit_.model = with_nuisances(fit_.parameters->model(at.u), at.nuisances, poses_);
-  fit_.fit.u = at.u;
-  fit_.fit.prediction = evaluator_.predict(fit_.model, near);
-  fit_.nuisances = at.nuisances;
-  if (fit_.fit.mask.empty()) fit_.fit.mask = calibration::points_over_skin(fit_.fit.prediction);
-  fit_.fit.residuals =
-      calibration::residuals_of(evaluator_.scene(), fit_.fit.prediction, fit_.fit.mask, ground_.noise_mm);
-  ++fit_.evaluations;
+  const bool first = fit_.fit.residuals.size() == 0;
+  if (first)
+    solve_first(evaluator_, poses_, at, near, ground_, fit_);
+  else
+    solve(evaluator_, poses_, at, near, ground_, fit_);
 }
 
 std::unique_ptr<simulation::Sensitivities> JointFitter::linearise() {
