@@ -15,7 +15,6 @@ constexpr double worth_refitting = 0.01;  // screened probability
 constexpr double held_by_refits = 0.99;   // of the screened probability
 constexpr double stands_out = 0.05;       // inclusion from which more than two sets are followed
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
-constexpr double bent = 20;  // of ln: a line that promises so much more, or less, is none
 constexpr std::size_t singles_to_draw_from = 3, most_further = 8;
 
 /// Effects that appear in what is screened with at least some probability.
@@ -98,7 +97,7 @@ class Follower {
     if (refit.solved) {
       const double promised = h.screened;
       h = refit.hypothesis;
-      bent_ = bent_ || std::abs(promised - h.ln_evidence) > bent;
+      bent_ = bent_ || std::abs(promised - h.ln_evidence) > lines_bend_at;
     } else {
       h.unsolved = true;
     }

@@ -10,6 +10,9 @@
 
 namespace supine::diagnosis {
 
+/// ln of the evidence: where a refit ends so far from what lines promise, they bend too much to be followed.
+inline constexpr double lines_bend_at = 20;
+
 /// A set of effects that may be missing, and how likely it is.
 struct Hypothesis {
   std::vector<int> effects;                        ///< rows of the candidates, ascending; none: nothing is missing

@@ -215,7 +215,8 @@ bool is_misplaced(const JointFit& fit) {
                      [](const Nuisance& nuisance) { return std::abs(nuisance.value) > misplaced; });
 }
 
-/// The likelier fit of the one that goes on from an earlier fit and, where that is misplaced, one that begins afresh.
+/// The likelier fit of the one that goes on from an earlier fit and, where lines did not lead there, one that begins
+/// afresh.
 bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& from,
               const std::vector<Candidate>& candidates, const Hypothesis& screened, Refit& result) {
   const JointFit unfitted = result.joint;
@@ -227,7 +228,8 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
   } catch (const NumericalFailure&) {
     // No equilibrium where the screening has it.
   }
-  if (!is_misplaced(from)) return result.solved;
+  const bool bent = result.solved && std::abs(screened.screened - h.ln_evidence) > lines_bend_at;
+  if (screened.drawn_at < 0 && !bent && !is_misplaced(from)) return result.solved;
   JointFit other = unfitted;
   other.fit.mask = base.fit.mask;
   Hypothesis afresh = fit_afresh(scene, base, screened, other);

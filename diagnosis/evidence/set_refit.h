@@ -36,9 +36,9 @@ simulation::EffectSetting free_setting(const std::string& effect);
 /// deviation from where it stood, its shape holds no more: then they are fitted as well (joint_fit.h). Laplace's
 /// evidence there for every size.
 ///
-/// Where @p from had to move what is never known by more than two standard deviations, it stands where no fit with more
-/// in it should begin: a second one then begins with effects at their usual size and nothing moved, and the likelier of
-/// both is kept.
+/// A second fit begins with effects at their usual size and nothing moved, and the likelier of both is kept, where the
+/// first ends far from what lines promise, where @p screened was drawn from a refit, and where @p from had to move what
+/// is never known by more than two standard deviations: a strength that begins near zero may stay there.
 /// @param given     the base model: where its priors stand
 /// @param from      the fit at which @p screened was drawn: the base fit, or a refit of a part of the set
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
