@@ -3,7 +3,10 @@
 """Cases made of those in samples/silicone_bar (docs/validation.md). Standard library alone.
 
     silicone_bar.py both SAMPLES FOLDER         both bars as one body: each at its own clamp, the second 100 mm in front
-    silicone_bar.py scan OUT FILE [SEED]        a made scan of a simulated case (OUT/hanging.vtu), seen as the real ones
+    silicone_bar.py scan OUT FILE SEED [KEY=NUMBER ...]
+                                                a made scan of a simulated case (OUT/hanging.vtu), seen as the real ones:
+                                                noise=0.6 shared=0.5 (1 sigma, mm), cell=6 (mm of contour that err alike,
+                                                0: each point by itself), from=25 to=300 (mm from the clamp)
     silicone_bar.py uncover CASE FOLDER MM      the case without scan points nearer than MM to the clamp
     silicone_bar.py clamp CASE FOLDER KIND      the case with the held head in the mesh (bar_with_head.stl): KIND = held
                                                 (its faces fixed) or a stiffness in kPa/mm (its faces on springs)
@@ -81,9 +84,13 @@ class Vtu:
         return struct.unpack(f"<{len(data) // struct.calcsize(letter)}{letter}", data)
 
 
-def scan(out, target, seed):
-    """Points of the upper, lower and end faces at five depths, from 25 mm off the clamp on: noise 0.6 mm along the
-    normal, and 0.5 mm that points within 25 mm share."""
+SCAN = {"noise": 0.6, "shared": 0.5, "cell": 6.0, "from": 25.0, "to": 300.0}
+
+
+def scan(out, target, seed, told):
+    """Points of the upper, lower and end faces at all depths: noise along the normal that a cell of the contour has in
+    common at every depth, and what points within 25 mm share."""
+    said = SCAN | told
     vtu = Vtu(out / "hanging.vtu")
     numbers, moved = vtu.array("Points"), vtu.array("displacement_mm")
     points = [numbers[i:i + 3] for i in range(0, len(numbers), 3)]
@@ -98,7 +105,7 @@ def scan(out, target, seed):
         a, b, d = (rest[n] for n in corner)
         normal = cross(minus(b, a), minus(d, a))
         size = sum(x * x for x in normal) ** 0.5
-        if abs(normal[2]) > 0.5 * size or max(p[0] for p in (a, b, d)) > -25:
+        if abs(normal[2]) > 0.5 * size or not all(said["from"] <= -p[0] <= said["to"] for p in (a, b, d)):
             continue
         a, b, d = (points[n] for n in corner)
         normal = cross(minus(b, a), minus(d, a))
@@ -106,8 +113,11 @@ def scan(out, target, seed):
         for _ in range(max(1, round(size / 2 / 8))):
             s, t = sorted((dice.random(), dice.random()))
             at = [a[k] * s + b[k] * (t - s) + d[k] * (1 - t) for k in range(3)]
-            shared = common.setdefault((round(at[0] / 25), round(at[1] / 25)), dice.gauss(0, 0.5))
-            off = (shared + dice.gauss(0, 0.6)) / length
+            shared = common.setdefault((round(at[0] / 25), round(at[1] / 25)), dice.gauss(0, said["shared"]))
+            own = dice.gauss(0, said["noise"])
+            if said["cell"] > 0:
+                own = common.setdefault(("own", *(round(x / said["cell"]) for x in at[:2])), own)
+            off = (shared + own) / length
             found.append(tuple(at[k] + off * normal[k] for k in range(3)))
     write_ply(target, ["comment made by bench/silicone_bar.py from a simulated bar", "comment unit mm"], found)
 
@@ -181,7 +191,10 @@ def main():
         if work == "both":
             both(*paths)
         elif work == "scan":
-            scan(*paths, int(words[3]) if len(words) > 3 else 1)
+            told = dict(word.split("=") for word in words[4:])
+            if told.keys() - SCAN.keys():
+                raise IndexError
+            scan(*paths, int(words[3]), {key: float(value) for key, value in told.items()})
         elif work == "picture":
             picture(*paths, pathlib.Path(words[3]))
         elif work == "uncover":

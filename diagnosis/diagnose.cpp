@@ -28,6 +28,11 @@ bool is_measurement(const std::string& effect) {
   return kind == simulation::EffectKind::measurement || kind == simulation::EffectKind::numerical;
 }
 
+/// Expected, and neither found nor excluded.
+bool is_left_open(const Priors& priors, const Inclusion& one) {
+  return priors.is_expected(one.effect) && one.probability > 1 - priors.named_at;
+}
+
 /// Effects of the smallest set of hypotheses that holds 95 %, of these those that pass; measurement causes first, then
 /// the likelier.
 template <class Pass>
@@ -67,12 +72,10 @@ std::string verdict_name(Verdict verdict) {
 std::vector<Inclusion> inclusions(const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& effects,
                                   const Priors& priors) {
   std::vector<Inclusion> list;
-  double before = 0;  // prior probability of each
-  for (std::size_t size = 1; size < priors.of_sets.size(); ++size)
-    before += priors.of_sets[size] * static_cast<double>(size) / static_cast<double>(effects.size());
   for (std::size_t e = 0; e < effects.size(); ++e) {
     constexpr double least = 1e-9;
     const double p = inclusion(hypotheses, static_cast<int>(e)), other = std::max(1 - p, least);
+    const double before = priors.of_effect(effects, effects[e]);
     list.push_back({effects[e], p, (p / other) / (before / (1 - before))});
   }
   std::stable_sort(list.begin(), list.end(),
@@ -92,7 +95,8 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
   if (!result.missing.empty()) {
     result.verdict = Verdict::missing;
     result.ambiguous_rest = likely_effects(hypotheses, effects, included, [&](const Inclusion& one) {
-      return one.probability < priors.named_at && one.bayes_factor >= factor_worth_naming;
+      return one.probability < priors.named_at &&
+             (one.bayes_factor >= factor_worth_naming || is_left_open(priors, one));
     });
     result.why = fmt::format("probability {:.2f} or more", priors.named_at);
     return result;
@@ -102,8 +106,10 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
                                 [](const Inclusion& one) { return one.bayes_factor >= factor_worth_naming; });
   if ((some && nothing < nothing_unlikely) || nothing < nothing_excluded) {
     result.verdict = Verdict::ambiguous;
-    result.missing = likely_effects(hypotheses, effects, included, [some](const Inclusion& one) {
-      return !some || one.bayes_factor >= factor_worth_naming;
+    const bool expected =
+        std::any_of(included.begin(), included.end(), [&](const Inclusion& one) { return is_left_open(priors, one); });
+    result.missing = likely_effects(hypotheses, effects, included, [&](const Inclusion& one) {
+      return (!some && !expected) || one.bayes_factor >= factor_worth_naming || is_left_open(priors, one);
     });
     if (result.missing.empty() && !included.empty()) result.missing = {included.front().effect};
     result.why = denied.empty() ? fmt::format("that nothing is missing has probability {:.2f}", nothing)

@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/examine.h"
 
-#include <fmt/ranges.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <set>
 
-#include "common/error.h"
 #include "common/rms.h"
 #include "common/statistics.h"
 #include "diagnosis/evidence/left_out.h"
+#include "diagnosis/follow.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -21,11 +19,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double worth_refitting = 0.01;  // screened probability
-constexpr double held_by_refits = 0.99;   // of the screened probability
-constexpr double stands_out = 0.05;       // inclusion from which more than two sets are followed
-constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
-
 void tell(const ExamineOptions& options, const std::string& what) {
   if (options.progress) options.progress(what);
 }
@@ -33,74 +26,6 @@ void tell(const ExamineOptions& options, const std::string& what) {
 const Hypothesis& nothing_of(const Findings& found) {
   return *std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
                        [](const Hypothesis& h) { return h.effects.empty(); });
-}
-
-/// Effects that appear in what is screened with at least some probability.
-bool something_stands_out(const Findings& found) {
-  for (std::size_t e = 0; e < found.candidates.size(); ++e)
-    if (inclusion(found.hypotheses, static_cast<int>(e)) > stands_out) return true;
-  return false;
-}
-
-/// The next hypothesis that should be followed through the chain, or nullptr.
-const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses) {
-  double sum = 0;
-  for (const Hypothesis& h : hypotheses) {
-    if (!h.effects.empty() && !h.refitted && !h.unsolved && h.probability >= worth_refitting) return &h;
-    sum += h.probability;
-    if (sum >= held_by_refits) break;
-  }
-  return nullptr;
-}
-
-/// The likeliest hypothesis less one effect, not followed yet; nullptr where there is none. Straight lines do the
-/// simpler one wrong beside one that was followed.
-const Hypothesis* simpler_than_first(const std::vector<Hypothesis>& hypotheses) {
-  const Hypothesis& first = hypotheses.front();
-  if (!first.refitted || first.effects.size() < 2) return nullptr;
-  const auto is_simpler = [&first](const Hypothesis& h) {
-    return !h.refitted && !h.unsolved && h.effects.size() + 1 == first.effects.size() &&
-           std::includes(first.effects.begin(), first.effects.end(), h.effects.begin(), h.effects.end());
-  };
-  const auto found = std::find_if(hypotheses.begin(), hypotheses.end(), is_simpler);
-  return found == hypotheses.end() ? nullptr : &*found;
-}
-
-void follow_one(const Subject& subject, const ExamineOptions& options, const Hypothesis& next, Findings& found) {
-  const std::vector<int> effects = next.effects;
-  std::vector<std::string> names;
-  for (const int e : effects) names.push_back(found.candidates[static_cast<std::size_t>(e)].effect);
-  tell(options, fmt::format("refit with {}", fmt::join(names, " and ")));
-  Refit refit = diagnosis::refit(subject.scene, subject.given, found.base, found.candidates, next);
-  for (Hypothesis& h : found.hypotheses) {
-    if (h.effects != effects) continue;
-    if (refit.solved)
-      h = refit.hypothesis;
-    else
-      h.unsolved = true;
-  }
-  found.refits.push_back(std::move(refit));
-  lower_unfollowed(found.hypotheses);
-  normalise(found.hypotheses);
-}
-
-/// The likeliest sets, and what is simpler than the one that comes out first.
-void follow(const Subject& subject, const ExamineOptions& options, Findings& found) {
-  auto most = static_cast<std::size_t>(options.refits);
-  if (!something_stands_out(found)) most = std::min(most, refits_when_quiet);
-  for (std::size_t simpler = 0;;) {
-    const Hypothesis* next = found.refits.size() < most ? next_to_refit(found.hypotheses) : nullptr;
-    if (next == nullptr && most > 0 && simpler < most_simpler) next = simpler_than_first(found.hypotheses), ++simpler;
-    if (next == nullptr) break;
-    follow_one(subject, options, *next, found);
-  }
-  const auto rank = [&found](const Refit& refit) {
-    for (const Hypothesis& h : found.hypotheses)
-      if (refit.solved && h.effects == refit.hypothesis.effects) return h.probability;
-    return -1.0;
-  };
-  std::stable_sort(found.refits.begin(), found.refits.end(),
-                   [&rank](const Refit& a, const Refit& b) { return rank(a) > rank(b); });
 }
 
 /// What was left out, predicted by the likeliest hypothesis with an effect beside the same without it.
@@ -230,7 +155,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   found->errors.emplace(found->base, found->base.nuisances, found->base.size_mm);
   found->candidates = find_candidates(evaluator, found->base.model, fit, found->unseen);
   tell(options, "effects at their usual size");
-  find_secants(subject.scene, found->base, found->candidates);
+  find_secants(subject.scene, found->base, found->base, found->candidates);
   found->table = score_candidates(fit.residuals, found->errors->metric().mean_mm, fit.linearisation.slope,
                                   found->candidates, found->errors->whitening(), options.seed);
   tell(options, "evidence");

@@ -20,7 +20,7 @@ RungFigures figures_of(const Findings& found, const std::string& added) {
 }
 
 RungFigures figures_of(const Refit& refit) {
-  return {refit.effects[0], refit.fit.residuals.skin_mm().cwiseAbs().mean(), refit.rms_mm, refit.held_out_rms_mm};
+  return {refit.effects[0], refit.joint.fit.residuals.skin_mm().cwiseAbs().mean(), refit.rms_mm, refit.held_out_rms_mm};
 }
 
 Rung rung_of(const Findings& found, const std::string& added, double probability) {
@@ -47,7 +47,7 @@ std::optional<RungFigures> random_other(const Subject& subject, const Findings& 
     if (const Refit* known = found.refit_of({names[static_cast<std::size_t>(effect)]})) return figures_of(*known);
     const auto screened = std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
                                        [effect](const Hypothesis& h) { return h.effects == std::vector{effect}; });
-    const Refit fitted = refit(subject.scene, subject.given, found.base, found.candidates, *screened);
+    const Refit fitted = refit(subject.scene, subject.given, found.base, found.base, found.candidates, *screened);
     if (fitted.solved) return figures_of(fitted);
   }
   return {};
@@ -69,7 +69,7 @@ Subject with_effect(const Subject& subject, const Findings& found, const std::st
   for (const std::string& name : simulation::free_parameters(with.start))
     if (const auto* number = simulation::find_setting(fitted, name))
       simulation::find_setting(with.start, name)->value = number->value;
-  with.near = &nearest->fit.prediction.solution;
+  with.near = &nearest->joint.fit.prediction.solution;
   return with;
 }
 

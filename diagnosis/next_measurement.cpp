@@ -109,8 +109,9 @@ class Pose {
     const Eigen::Index n = place_.rows();
     const auto scans = found_.base.fit.prediction.poses.size();
     const double points = static_cast<double>(found_.base.fit.residuals.skin_rows()) / static_cast<double>(scans * n);
-    const double nugget =
-        mean_square(found_.base.noise_of_point_mm.head(found_.base.fit.residuals.skin_rows())) / std::max(1.0, points);
+    const double nugget = mean_square(found_.base.noise_of_point_mm.cwiseProduct(found_.base.repeats.cwiseSqrt())
+                                          .head(found_.base.fit.residuals.skin_rows())) /
+                          std::max(1.0, points);
     const auto& mesh = found_.base.numerical;
     const double shared = mesh ? mesh->spread_mm * mesh->spread_mm : 0, length_mm = mesh ? mesh->length_mm : 1;
     Eigen::MatrixXd sigma = Eigen::MatrixXd::Zero(n, n);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "calibration/noise.h"
 #include "common/error.h"
@@ -24,26 +25,31 @@ using Eigen::VectorXd;
 
 constexpr Index most_clusters = 600;
 constexpr int most_steps = 6;
-constexpr double settled = 0.3;       // of F: a further step gains no more
-constexpr double longest_step = 1.0;  // of a coordinate of a modulus: e
-constexpr int most_halvings = 4;
 constexpr int most_rounds = 3;
 constexpr double far = 0.2;  // of a coordinate: errors measured there are not those of the body any more
 
 /// The scanner's noise, what is white of it and what neighbours share.
 struct ScanNoise {
   VectorXd white_mm, shared_mm;
+  VectorXd repeats;  // points that say what one says
 };
 
 /// White is what neighbouring points show, where there are enough of them. Where that is less than the case says, the
-/// rest is taken to be shared. Landmarks err one by one.
-ScanNoise noise_of(const Residuals& residuals, const VectorXd& shared_mm) {
+/// rest is taken to be shared. Points that repeat each other show nothing: where the case says how many they are worth,
+/// white is what it says, and each counts for less. Landmarks err one by one.
+/// @param worth  per measurement
+ScanNoise noise_of(const Residuals& residuals, const VectorXd& shared_mm,
+                   const std::vector<std::optional<double>>& worth) {
   constexpr int fewest = 200;
-  ScanNoise noise{residuals.sigma_mm, shared_mm};
+  ScanNoise noise{residuals.sigma_mm, shared_mm, VectorXd::Ones(residuals.size())};
   for (int pose = 0; pose <= residuals.pose.maxCoeff(); ++pose) {
     std::vector<int> rows;
     for (Index r = 0; r < residuals.size(); ++r)
       if (residuals.pose[r] == pose && !residuals.is_landmark(r)) rows.push_back(static_cast<int>(r));
+    if (const auto& independent = worth[static_cast<std::size_t>(pose)]) {
+      noise.repeats(rows).setConstant(std::max(1.0, static_cast<double>(rows.size()) / *independent));
+      continue;
+    }
     if (rows.size() < fewest) continue;
     const double seen = calibration::estimate_noise_mm(residuals.place(rows, Eigen::all), residuals.distance_mm(rows));
     for (const int r : rows) {
@@ -80,9 +86,12 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
     shared_mm[r] = residuals.is_landmark(r)
                        ? 0
                        : priors.scan_shared_in(measurements[static_cast<std::size_t>(residuals.pose[r])]->pose.name);
-  const ScanNoise noise = noise_of(residuals, shared_mm);
+  std::vector<std::optional<double>> worth;
+  for (const auto* measurement : measurements) worth.push_back(priors.independent_points_in(measurement->pose.name));
+  const ScanNoise noise = noise_of(residuals, shared_mm, worth);
   base.noise_of_point_mm = noise.white_mm;
-  const VectorXd variance = base.clusters.means(base.noise_of_point_mm.cwiseAbs2());
+  base.repeats = noise.repeats;
+  const VectorXd variance = base.clusters.means(base.noise_of_point_mm.cwiseAbs2().cwiseProduct(base.repeats));
   base.errors = variance.cwiseQuotient(base.clusters.members).asDiagonal();
   add_shared(base, priors, base.clusters.means(noise.shared_mm), base.errors);
   base.patches = base.clusters.means(
@@ -103,25 +112,6 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
   base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);
 }
 
-/// Where a step would lead.
-struct Trial {
-  VectorXd u;
-  std::vector<Nuisance> nuisances;
-};
-
-Trial stepped(const BaseFit& base, const VectorXd& step) {
-  const Index moduli = base.fit.u.size();
-  Trial trial{base.parameters->clamped(base.fit.u + step.head(moduli)), base.nuisances};
-  for (Index k = moduli; k < step.size(); ++k) trial.nuisances[static_cast<std::size_t>(k - moduli)].value += step[k];
-  return trial;
-}
-
-double objective(const BaseFit& base, const VectorXd& y, const Trial& at) {
-  double sum = base.covariance->square(y, base.size_mm) + base.parameters->prior_deviation(at.u).squaredNorm();
-  for (const Nuisance& nuisance : at.nuisances) sum += nuisance.value * nuisance.value;
-  return sum;
-}
-
 LinearEvidence evidence_at(const BaseFit& base) {
   return {*base.covariance, base.distances(base.fit.residuals),
           directions_at(base.fit, *base.parameters, base.nuisances, base.clusters)};
@@ -132,77 +122,6 @@ Weighed with_all(const LinearEvidence& evidence) {
   std::iota(all.begin(), all.end(), 0);
   return evidence.weigh(all);
 }
-
-class Fitter {
- public:
-  Fitter(Evaluator& evaluator, BaseFit& base) : evaluator_(evaluator), base_(base) {
-    poses_.push_back(evaluator.scene().prone.name);
-    for (const auto* measurement : evaluator.scene().measurements) poses_.push_back(measurement->pose.name);
-  }
-
-  const std::vector<std::string>& poses() const { return poses_; }
-
-  void predict(const Trial& at, const simulation::ChainSolution* near) {
-    base_.model = with_nuisances(base_.parameters->model(at.u), at.nuisances, poses_);
-    base_.fit.u = at.u;
-    base_.fit.prediction = evaluator_.predict(base_.model, near);
-    base_.nuisances = at.nuisances;
-    if (base_.fit.mask.empty()) base_.fit.mask = calibration::points_over_skin(base_.fit.prediction);
-    base_.fit.residuals =
-        calibration::residuals_of(evaluator_.scene(), base_.fit.prediction, base_.fit.mask, base_.noise_mm);
-    ++base_.evaluations;
-  }
-
-  /// Slopes of moduli and nuisances at the prediction.
-  std::unique_ptr<simulation::Sensitivities> linearise() {
-    auto sensitivities =
-        std::make_unique<simulation::Sensitivities>(evaluator_.chain(), base_.model, base_.fit.prediction.solution);
-    const FreeParameters there(with_nuisances(base_.parameters->base(), base_.nuisances, poses_));
-    base_.fit.linearisation = calibration::linearise(evaluator_, *sensitivities, there, base_.fit.u,
-                                                     base_.fit.prediction, base_.fit.residuals);
-    find_shapes(evaluator_, *sensitivities, base_.model, base_.fit.prediction, base_.fit.residuals, base_.nuisances);
-    return sensitivities;
-  }
-
-  /// One step of Gauss and Newton, shortened until F falls. @return  whether it did by more than a little
-  bool improve() {
-    const LinearEvidence evidence = evidence_at(base_);
-    const Weighed weighed = with_all(evidence);
-    Index likeliest;
-    weighed.size_probability.maxCoeff(&likeliest);
-    base_.size_mm = base_.size_of(weighed);
-    VectorXd step = weighed.mean[static_cast<std::size_t>(likeliest)];
-    const double moduli = step.head(base_.fit.u.size()).cwiseAbs().maxCoeff();
-    if (moduli > longest_step) step *= longest_step / moduli;
-    const Trial now{base_.fit.u, base_.nuisances};
-    const double before = objective(base_, base_.distances(base_.fit.residuals), now);
-    const VectorXd y = base_.distances(base_.fit.residuals);
-    const Trial wanted = stepped(base_, step);
-    const double promised = before - objective(base_, y + evidence.directions().columns * step, wanted);
-    if (promised < settled) return false;
-    const calibration::Fit kept = base_.fit;
-    const simulation::Model kept_model = base_.model;
-    for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
-      base_.fit.u = kept.u, base_.nuisances = now.nuisances;
-      const Trial trial = stepped(base_, step);
-      const simulation::ChainSolution near =
-          calibration::extrapolated(kept.prediction.solution, kept.linearisation.by_coordinate, trial.u - kept.u);
-      try {
-        predict(trial, &near);
-        if (objective(base_, base_.distances(base_.fit.residuals), trial) < before) return true;
-      } catch (const NumericalFailure&) {
-        // No equilibrium there: a shorter step.
-      }
-    }
-    base_.fit = kept, base_.model = kept_model, base_.nuisances = now.nuisances;
-    return false;
-  }
-
- private:
-  Evaluator& evaluator_;
-  BaseFit& base_;
-  std::vector<std::string> poses_;
-};
 
 void measure_mesh(Evaluator& evaluator, BaseFit& base) {
   const std::optional<NumericalError> before = std::move(base.numerical);
@@ -278,7 +197,7 @@ BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, con
   BaseFit base;
   base.noise_mm = noise_mm;
   base.parameters.emplace(given);
-  Fitter fitter(evaluator, base);
+  JointFitter fitter(evaluator, base, base);
   base.nuisances = nuisances_of(given, fitter.poses(), options.priors);
   fitter.predict({coordinates_of(*base.parameters, start), base.nuisances}, near);
   base.clusters = calibration::cluster_points(base.fit.residuals, most_clusters);
@@ -287,11 +206,7 @@ BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, con
     tell("errors of mesh and body");
     if (options.other_meshes) measure_mesh(evaluator, base);
     find_errors(evaluator, *fitter.linearise(), options.priors, base);
-    for (int step = 0; step < most_steps; ++step) {
-      tell("fit with all that is never known");
-      if (!fitter.improve()) break;
-      fitter.linearise();
-    }
+    fitter.descend(most_steps, [&] { tell("fit with all that is never known"); });
     if ((base.fit.u - measured_at).cwiseAbs().maxCoeff() < far) break;
   }
   return base;

@@ -9,6 +9,7 @@
 
 #include "calibration/error_model.h"
 #include "calibration/least_squares.h"
+#include "diagnosis/evidence/joint_fit.h"
 #include "diagnosis/evidence/linear_evidence.h"
 #include "diagnosis/evidence/nuisances.h"
 #include "diagnosis/evidence/priors.h"
@@ -18,24 +19,19 @@ namespace supine::diagnosis {
 
 /// A model that lacks nothing, fitted together with all that is never known, and what is needed to weigh others
 /// against it. Clusters of points, errors and discrepancy are fixed here, once, for every hypothesis.
-struct BaseFit {
-  std::optional<calibration::FreeParameters> parameters;  ///< of the model as given: where its priors stand
-  simulation::Model model;                                ///< at the optimum, nuisances at their values
-  calibration::Fit fit;                                   ///< of it
-  std::vector<Nuisance> nuisances;                        ///< at the optimum
-  std::vector<double> noise_mm;                           ///< per measurement, as given
+struct BaseFit : JointFit {
+  std::vector<double> noise_mm;  ///< per measurement, as given
   calibration::Clusters clusters;
-  Eigen::VectorXd noise_of_point_mm;  ///< #R, of the scanner
-  double patchiness_mm = 0;           ///< rms that uneven tissue, skin and muscle make
-  Eigen::VectorXd mean_mm;            ///< #R, added to the distances: what the mesh takes away
-  Eigen::MatrixXd errors;             ///< R over the clusters, without nuisances
-  Eigen::MatrixXd patches;            ///< what of them uneven tissue, skin and muscle make: P with P Pᵀ in R
-  Eigen::MatrixXd kernel;             ///< K over the clusters
+  Eigen::VectorXd noise_of_point_mm;            ///< #R, of the scanner
+  Eigen::VectorXd repeats;                      ///< #R, how many points of the scan say what one does
+  double patchiness_mm = 0;                     ///< rms that uneven tissue, skin and muscle make
+  Eigen::VectorXd mean_mm;                      ///< #R, added to the distances: what the mesh takes away
+  Eigen::MatrixXd errors;                       ///< R over the clusters, without nuisances
+  Eigen::MatrixXd patches;                      ///< what of them uneven tissue, skin and muscle make: P with P Pᵀ in R
+  Eigen::MatrixXd kernel;                       ///< K over the clusters
   std::unique_ptr<ErrorCovariance> covariance;  ///< of both
   double scale_mm = 0, most_mm = 0;             ///< of the prior of the discrepancy's size
-  double size_mm = 0;                           ///< s of the discrepancy that is likeliest
   std::optional<NumericalError> numerical;      ///< none: the mesh is taken to be exact
-  int evaluations = 0;
 
   /// Distances over the clusters, the mesh's error taken away.
   Eigen::VectorXd distances(const calibration::Residuals& residuals) const;

@@ -18,30 +18,53 @@ namespace {
 constexpr std::size_t pairs_for_triples = 10;
 constexpr double least_rest = 0.3;  // of the usual size: a shorter secant is no better than the slope
 
-double binomial(std::size_t n, std::size_t k) {
-  double value = 1;
-  for (std::size_t i = 0; i < k; ++i) value *= static_cast<double>(n - i) / static_cast<double>(i + 1);
-  return value;
-}
-
 /// Rows of the nuisances that an effect replaces: those of its own kind that are one for all poses.
-std::vector<int> replaced_by(const BaseFit& base, const std::string& effect) {
+std::vector<int> replaced_by(const JointFit& at, const std::string& effect) {
   std::vector<int> rows;
-  const auto moduli = static_cast<int>(base.fit.u.size());
-  for (std::size_t k = 0; k < base.nuisances.size(); ++k)
-    if (base.nuisances[k].effect == effect && base.nuisances[k].pose.empty())
-      rows.push_back(moduli + static_cast<int>(k));
+  const auto moduli = static_cast<int>(at.fit.u.size());
+  for (std::size_t k = 0; k < at.nuisances.size(); ++k)
+    if (at.nuisances[k].effect == effect && at.nuisances[k].pose.empty()) rows.push_back(moduli + static_cast<int>(k));
   return rows;
 }
 
 /// What these say, in the effect's own unit.
-double already_said(const BaseFit& base, const std::string& effect) {
+double already_said(const JointFit& at, const std::string& effect) {
   double already = 0;
-  for (const int row : replaced_by(base, effect)) {
-    const Nuisance& nuisance = base.nuisances[static_cast<std::size_t>(row - base.fit.u.size())];
+  for (const int row : replaced_by(at, effect)) {
+    const Nuisance& nuisance = at.nuisances[static_cast<std::size_t>(row - at.fit.u.size())];
     already += nuisance.value * nuisance.sigma;
   }
   return already;
+}
+
+/// Adds the numbers of a candidate to the directions, and gives their rows.
+std::vector<int> add_candidate(const BaseFit& base, const JointFit& at, const Candidate& candidate, Directions& all) {
+  std::vector<int> rows;
+  const double already = already_said(at, candidate.effect);
+  const Eigen::MatrixXd slope = base.clusters.means(candidate.slope);
+  for (std::size_t k = 0; k < candidate.parameters.size(); ++k) {
+    const CandidateParameter& p = candidate.parameters[k];
+    const StrengthPrior prior = strength_prior(*simulation::find_parameter(p.name));
+    Eigen::VectorXd column = slope.col(static_cast<Eigen::Index>(k));
+    if (candidate.secant.size() > 0) column = base.clusters.means(candidate.secant) / (prior.median - p.null);
+    rows.push_back(static_cast<int>(all.size()));
+    all.add(p.name, column, prior.mean() - p.null - already, prior.sd());
+    if (prior.log_normal) all.cut_below(-already);
+  }
+  return rows;
+}
+
+/// @p rows without those that are replaced, and with those of an effect.
+std::vector<int> exchanged(std::vector<int> rows, const std::vector<int>& replaced, const std::vector<int>& own) {
+  std::erase_if(rows, [&](int row) { return std::find(replaced.begin(), replaced.end(), row) != replaced.end(); });
+  rows.insert(rows.end(), own.begin(), own.end());
+  return rows;
+}
+
+std::vector<int> first_rows(Eigen::Index count) {
+  std::vector<int> rows(static_cast<std::size_t>(count));
+  std::iota(rows.begin(), rows.end(), 0);
+  return rows;
 }
 
 bool is_part_of(const Hypothesis& part, const Hypothesis& whole) {
@@ -57,22 +80,21 @@ int Hypothesis::place_of(const std::string& name) const {
   return -1;
 }
 
-double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t size) {
-  return std::log(priors.of_sets.at(size) / binomial(candidates, size));
-}
-
 void lower_unfollowed(std::vector<Hypothesis>& hypotheses) {
-  double least = std::numeric_limits<double>::infinity(), nothing = -least;
+  constexpr double none = std::numeric_limits<double>::infinity();
+  double nothing = -none, least[2] = {none, none};  // from the base fit, from refits
   for (const Hypothesis& h : hypotheses) {
-    if (h.refitted) least = std::min(least, h.screened - h.ln_evidence);
+    double& own = least[h.drawn_at < 0 ? 0 : 1];
+    if (h.refitted) own = std::min(own, h.screened - h.ln_evidence);
     if (h.effects.empty()) nothing = h.ln_evidence;
   }
-  if (!std::isfinite(least)) return;
   for (Hypothesis& h : hypotheses) {
-    if (h.refitted || h.effects.empty()) continue;
-    double fall = std::max(least, 0.0);
+    const double own = least[h.drawn_at < 0 ? 0 : 1];
+    if (h.refitted || h.effects.empty() || !std::isfinite(own)) continue;
+    double fall = std::max(own, 0.0);
     for (const Hypothesis& part : hypotheses)
-      if (part.refitted && is_part_of(part, h)) fall = std::max(fall, part.screened - part.ln_evidence);
+      if (h.drawn_at < 0 && part.drawn_at < 0 && part.refitted && is_part_of(part, h))
+        fall = std::max(fall, part.screened - part.ln_evidence);
     h.ln_evidence = std::max(h.screened - fall, std::min(h.screened, nothing));
   }
 }
@@ -94,30 +116,16 @@ double inclusion(const std::vector<Hypothesis>& hypotheses, int effect) {
 }
 
 Screening::Screening(const BaseFit& base, const std::vector<Candidate>& candidates, const Priors& priors)
-    : priors_(priors), count_(candidates.size()) {
+    : priors_(priors) {
   Directions all = directions_at(base.fit, *base.parameters, base.nuisances, base.clusters);
-  base_rows_.resize(static_cast<std::size_t>(all.size()));
-  std::iota(base_rows_.begin(), base_rows_.end(), 0);
+  base_rows_ = first_rows(all.size());
   for (const Candidate& candidate : candidates) {
-    const std::vector<int> replaced = replaced_by(base, candidate.effect);
-    const double already = already_said(base, candidate.effect);
-    std::vector<int> rows;
-    const Eigen::MatrixXd slope = base.clusters.means(candidate.slope);
-    for (std::size_t k = 0; k < candidate.parameters.size(); ++k) {
-      const CandidateParameter& p = candidate.parameters[k];
-      const StrengthPrior prior = strength_prior(*simulation::find_parameter(p.name));
-      Eigen::VectorXd column = slope.col(static_cast<Eigen::Index>(k));
-      if (candidate.secant.size() > 0) column = base.clusters.means(candidate.secant) / (prior.median - p.null);
-      rows.push_back(static_cast<int>(all.size()));
-      const double mean = prior.mean() - p.null - already;
-      all.add(p.name, column, mean, prior.sd());
-      if (prior.log_normal) all.cut_below(-already);
-    }
-    of_effect_.push_back(rows);
-    replaced_.push_back(replaced);
+    effects_.push_back(candidate.effect);
+    replaced_.push_back(replaced_by(base, candidate.effect));
+    of_effect_.push_back(add_candidate(base, base, candidate, all));
   }
   evidence_ = std::make_shared<LinearEvidence>(*base.covariance, base.distances(base.fit.residuals), std::move(all));
-  const int count = static_cast<int>(count_);
+  const int count = static_cast<int>(effects_.size());
   hypotheses_.push_back(weigh({}));
   for (int a = 0; a < count; ++a) hypotheses_.push_back(weigh({a}));
   std::vector<Hypothesis> pairs;
@@ -141,14 +149,11 @@ Screening::Screening(const BaseFit& base, const std::vector<Candidate>& candidat
 
 Hypothesis Screening::weigh(std::vector<int> effects) const {
   Hypothesis h;
-  h.ln_prior = ln_prior_of_set(priors_, count_, effects.size());
+  h.ln_prior = priors_.ln_of_set(effects_, effects);
   h.rows = base_rows_;
   for (const int effect : effects) {
     const auto e = static_cast<std::size_t>(effect);
-    std::erase_if(h.rows, [&](int row) {
-      return std::find(replaced_[e].begin(), replaced_[e].end(), row) != replaced_[e].end();
-    });
-    h.rows.insert(h.rows.end(), of_effect_[e].begin(), of_effect_[e].end());
+    h.rows = exchanged(std::move(h.rows), replaced_[e], of_effect_[e]);
   }
   h.effects = std::move(effects);
   h.evidence = evidence_;
@@ -157,22 +162,50 @@ Hypothesis Screening::weigh(std::vector<int> effects) const {
   return h;
 }
 
-void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, std::vector<Candidate>& candidates) {
+std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, const Hypothesis& part,
+                                      const std::vector<std::string>& effects, const std::vector<Candidate>& further,
+                                      const Priors& priors) {
+  Directions all = directions_at(at.fit, *at.parameters, at.nuisances, base.clusters);
+  const std::vector<int> own = first_rows(all.size());
+  std::vector<std::vector<int>> rows;
+  for (const Candidate& candidate : further) rows.push_back(add_candidate(base, at, candidate, all));
+  const auto evidence =
+      std::make_shared<LinearEvidence>(*base.covariance, base.distances(at.fit.residuals), std::move(all));
+  std::vector<Hypothesis> list;
+  for (std::size_t c = 0; c < further.size(); ++c) {
+    Hypothesis h;
+    h.effects = part.effects;
+    h.effects.push_back(
+        static_cast<int>(std::find(effects.begin(), effects.end(), further[c].effect) - effects.begin()));
+    std::sort(h.effects.begin(), h.effects.end());
+    h.ln_prior = priors.ln_of_set(effects, h.effects);
+    h.rows = exchanged(own, replaced_by(at, further[c].effect), rows[c]);
+    h.evidence = evidence;
+    h.weighed = evidence->weigh(h.rows);
+    // Where the part's strength is far from linear its evidence is another one than Laplace's.
+    h.ln_evidence = h.screened = h.weighed.ln_evidence + part.ln_evidence - part.weighed.ln_evidence;
+    if (std::isfinite(h.ln_evidence)) list.push_back(std::move(h));  // else its slopes there are no numbers
+  }
+  return list;
+}
+
+void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& at,
+                  std::vector<Candidate>& candidates) {
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     const auto& rows = candidates[c].parameters;
     const simulation::Parameter* row = simulation::find_parameter(rows[0].name);
     if (rows.size() != 1 || row->median == row->null) continue;
-    simulation::Model model = base.model;
+    simulation::Model model = at.model;
     model.effects.push_back(simulation::null_setting(*simulation::find_effect(candidates[c].effect)));
-    const double usual = row->median - row->null, rest = usual - already_said(base, candidates[c].effect);
+    const double usual = row->median - row->null, rest = usual - already_said(at, candidates[c].effect);
     if (std::abs(rest) < least_rest * std::abs(usual)) continue;
     model.effects.back().parameters[row->name].value = row->null + rest;
     try {
       calibration::Evaluator evaluator(scene, model, accurate_enough());
-      const calibration::Prediction moved = evaluator.predict(model, &base.fit.prediction.solution);
-      const auto there = calibration::residuals_of(scene, moved, base.fit.mask, base.noise_mm);
-      candidates[c].secant = (usual / rest) * (there.distance_mm - base.fit.residuals.distance_mm);
+      const calibration::Prediction moved = evaluator.predict(model, &at.fit.prediction.solution);
+      const auto there = calibration::residuals_of(scene, moved, at.fit.mask, base.noise_mm);
+      candidates[c].secant = (usual / rest) * (there.distance_mm - at.fit.residuals.distance_mm);
     } catch (const NumericalFailure&) {
       // No equilibrium at the usual size: the slope at the null has to do.
     }

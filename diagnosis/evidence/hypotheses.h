@@ -10,6 +10,9 @@
 
 namespace supine::diagnosis {
 
+/// ln of the evidence: where a refit ends so far from what lines promise, they bend too much to be followed.
+inline constexpr double lines_bend_at = 20;
+
 /// A set of effects that may be missing, and how likely it is.
 struct Hypothesis {
   std::vector<int> effects;                        ///< rows of the candidates, ascending; none: nothing is missing
@@ -18,6 +21,7 @@ struct Hypothesis {
   double screened = 0;                             ///< the same along straight lines
   double probability = 0;                          ///< posterior, over all that were weighed
   bool refitted = false;                           ///< through the whole chain, else along straight lines
+  int drawn_at = -1;                               ///< refit from which the lines were drawn; -1: the base fit
   bool unsolved = false;                           ///< the chain found no equilibrium: stays as screened
   Weighed weighed;                                 ///< by rows
   std::vector<int> rows;                           ///< of the evidence's directions
@@ -40,15 +44,21 @@ class Screening {
   Hypothesis weigh(std::vector<int> effects) const;
 
   Priors priors_;
-  std::size_t count_;
+  std::vector<std::string> effects_;
   std::vector<int> base_rows_;
   std::vector<std::vector<int>> of_effect_, replaced_;  // rows of the directions
   std::shared_ptr<const LinearEvidence> evidence_;
   std::vector<Hypothesis> hypotheses_;
 };
 
-/// ln of the prior of one set of @p size out of @p candidates effects.
-double ln_prior_of_set(const Priors& priors, std::size_t candidates, std::size_t size);
+/// The set of a refit with each further effect, weighed along straight lines from that refit.
+/// @param at       the refit
+/// @param part     its hypothesis
+/// @param effects  all that are weighed, in the order that hypotheses count them
+/// @param further  those that @p part does not have, with their slopes at the refit
+std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, const Hypothesis& part,
+                                      const std::vector<std::string>& effects, const std::vector<Candidate>& further,
+                                      const Priors& priors);
 
 /// What was not followed through the chain is lowered by the smallest fall of the evidence that following showed, and
 /// by the largest that a part of it showed: where lines promise too much of an effect they do so of every set that
@@ -62,8 +72,9 @@ void normalise(std::vector<Hypothesis>& hypotheses);
 double inclusion(const std::vector<Hypothesis>& hypotheses, int effect);
 
 /// Change of the distances by the usual size of every candidate of one number that has one, solved with the model of
-/// the base fit: Candidate::secant. Where a nuisance says some of it already, it is what the rest of it changes, as if
+/// a fit: Candidate::secant. Where a nuisance says some of it already, it is what the rest of it changes, as if
 /// all of it did.
-void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, std::vector<Candidate>& candidates);
+void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& at,
+                  std::vector<Candidate>& candidates);
 
 }  // namespace supine::diagnosis

@@ -3,7 +3,9 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "diagnosis/evidence/patchiness.h"
 #include "simulation/effect.h"
@@ -14,12 +16,15 @@ namespace supine::diagnosis {
 struct KnownOfPose {
   simulation::MeasurementTolerances known;
   double scan_shared_mm;
+  std::optional<double> independent_points = {};  ///< how many the scan is worth; none: all it has
 };
 
 /// What is believed before anything is measured: all that a verdict rests on (docs/diagnosis.md).
 struct Priors {
   /// Of sets of none, one, two and three effects; shared evenly by the sets of a size.
   std::array<double, 4> of_sets = {0.5, 0.3, 0.15, 0.05};
+  /// Effects that are as likely there as not, each by itself; `of_sets` is of the others.
+  std::vector<std::string> expected = {};
   simulation::MeasurementTolerances known = {};  ///< nuisances, 1 sigma
   std::map<std::string, KnownOfPose> of_pose;    ///< by name, in place of `known` and `scan_shared_mm`
   Patchiness patchiness = {};
@@ -30,8 +35,14 @@ struct Priors {
   double named_at = 0.95;             ///< inclusion probability from which an effect is named
   double unexplained_bound_mm = 0.5;  ///< above it what is left is told as a verdict
 
+  bool is_expected(const std::string& effect) const;
+  /// ln of the prior of one set. @param effects  all that are weighed  @param set  rows of them
+  double ln_of_set(const std::vector<std::string>& effects, const std::vector<int>& set) const;
+  /// Σ of the priors of what holds the effect.
+  double of_effect(const std::vector<std::string>& effects, const std::string& effect) const;
   const simulation::MeasurementTolerances& known_in(const std::string& pose) const;
   double scan_shared_in(const std::string& pose) const;
+  std::optional<double> independent_points_in(const std::string& pose) const;
 };
 
 /// The prior of one number of an effect: normal, or log-normal where only values above null make sense.

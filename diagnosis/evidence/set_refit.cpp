@@ -22,35 +22,47 @@ using calibration::FreeParameters;
 using Eigen::Index;
 using Eigen::VectorXd;
 
+constexpr double far = 1;        // of a nuisance, in sigma: its shape holds no more
+constexpr double misplaced = 2;  // the same: a fit that has it there is no place to begin
+constexpr int most_joint_steps = 8;
+
 /// Nuisances that no effect of the set replaces.
-std::vector<Nuisance> kept(const BaseFit& base, const std::vector<std::string>& effects) {
-  std::vector<Nuisance> list = base.nuisances;
+std::vector<Nuisance> kept(const JointFit& from, const std::vector<std::string>& effects) {
+  std::vector<Nuisance> list = from.nuisances;
   std::erase_if(list, [&effects](const Nuisance& nuisance) {
     return nuisance.pose.empty() && std::find(effects.begin(), effects.end(), nuisance.effect) != effects.end();
   });
   return list;
 }
 
-/// Base numbers where the base fit has them, strengths where the screening has them.
-VectorXd start_of(const FreeParameters& parameters, const BaseFit& base, const std::vector<Candidate>& candidates,
+double offset_of(const Hypothesis& h, const std::string& name) {
+  const int place = h.place_of(name);
+  return place < 0 ? 0 : h.weighed.number(place).first;
+}
+
+/// A strength where the screening has it.
+double screened_value(const CandidateParameter& p, const Hypothesis& screened, bool is_log) {
+  const double reach = 3 * p.typical;  // a line drawn further than that is no longer the effect
+  const double value = p.null + std::clamp(offset_of(screened, p.name), -reach, reach);
+  return is_log ? std::max(value, 0.1 * p.typical) : value;
+}
+
+/// Numbers that the earlier fit has where it has them, strengths of what is new where the screening has them.
+VectorXd start_of(const FreeParameters& parameters, const JointFit& from, const std::vector<Candidate>& candidates,
                   const Hypothesis& screened) {
   VectorXd u = parameters.start();
   const auto& names = parameters.names();
+  const auto& own = from.parameters->names();
   for (Index i = 0; i < u.size(); ++i) {
     const std::string& name = names[static_cast<std::size_t>(i)];
-    const auto& own = base.parameters->names();
     const auto found = std::find(own.begin(), own.end(), name);
-    if (found != own.end()) u[i] = base.fit.u[found - own.begin()];
-    const int place = screened.place_of(name);
-    if (found != own.end() || place < 0) continue;
+    if (found != own.end()) {
+      u[i] = from.fit.u[found - own.begin()];
+      continue;
+    }
     for (const int effect : screened.effects)
-      for (const CandidateParameter& p : candidates[static_cast<std::size_t>(effect)].parameters) {
-        if (p.name != name) continue;
-        const double reach = 3 * p.typical;  // a line drawn further than that is no longer the effect
-        const double value = p.null + std::clamp(screened.weighed.number(place).first, -reach, reach);
-        const double least = parameters.is_log(i) ? 0.1 * p.typical : -1e300;
-        u[i] = parameters.coordinate(i, std::max(value, least));
-      }
+      for (const CandidateParameter& p : candidates[static_cast<std::size_t>(effect)].parameters)
+        if (p.name == name) u[i] = parameters.coordinate(i, screened_value(p, screened, parameters.is_log(i)));
   }
   return parameters.clamped(u);
 }
@@ -65,11 +77,11 @@ std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParamet
     const std::string effect = name.substr(0, name.find('.'));
     if (std::find(refit.effects.begin(), refit.effects.end(), effect) == refit.effects.end()) continue;
     const auto [offset, sd] = refit.hypothesis.weighed.number(i);
-    const double u = refit.fit.u[i] + offset, reach = normal_reach95() * sd;
+    const double u = refit.joint.fit.u[i] + offset, reach = normal_reach95() * sd;
     const auto value = [&](double at) {
       return parameters.value(i, std::clamp(at, parameters.lower()[i], parameters.upper()[i]));
     };
-    const RangeEnd end = range_end(parameters, refit.fit.u, i);
+    const RangeEnd end = range_end(parameters, refit.joint.fit.u, i);
     const auto at = curved.find(i);
     if (at == curved.end())
       list.push_back({name, parameters.unit(i), value(u), value(u - reach), value(u + reach), end});
@@ -93,12 +105,10 @@ VectorXd distances_at_posterior(const BaseFit& base, const Hypothesis& h, const 
 }
 
 /// Fills the hypothesis of a fit: Laplace's evidence at the optimum.
-void weigh_at(const BaseFit& base, const std::vector<Nuisance>& nuisances, const FreeParameters& parameters,
-              Refit& result) {
-  Hypothesis& h = result.hypothesis;
+void weigh_at(const BaseFit& base, const JointFit& fit, Hypothesis& h) {
   h.refitted = true;
-  h.evidence = std::make_shared<LinearEvidence>(*base.covariance, base.distances(result.fit.residuals),
-                                                directions_at(result.fit, parameters, nuisances, base.clusters));
+  h.evidence = std::make_shared<LinearEvidence>(*base.covariance, base.distances(fit.fit.residuals),
+                                                directions_at(fit.fit, *fit.parameters, fit.nuisances, base.clusters));
   h.rows.resize(static_cast<std::size_t>(h.evidence->directions().size()));
   std::iota(h.rows.begin(), h.rows.end(), 0);
   h.weighed = h.evidence->weigh(h.rows);
@@ -157,38 +167,111 @@ simulation::EffectSetting free_setting(const std::string& name) {
   return setting;
 }
 
+namespace {
+
+std::vector<std::string> poses_of(const calibration::MeasuredScene& scene) {
+  std::vector<std::string> poses{scene.prone.name};
+  for (const auto* measurement : scene.measurements) poses.push_back(measurement->pose.name);
+  return poses;
+}
+
+/// Numbers with nuisances as errors, then, where that leads far, with them.
+void fit_set(const calibration::MeasuredScene& scene, const BaseFit& base, const VectorXd& start,
+             const simulation::ChainSolution* near, JointFit& joint, Hypothesis& h) {
+  const FreeParameters there(with_nuisances(joint.parameters->base(), joint.nuisances, poses_of(scene)));
+  calibration::Evaluator evaluator(scene, there.base(), accurate_enough());
+  const FitErrors errors(base, joint.nuisances, joint.size_mm);
+  WeightedFit fit = weigh(evaluator, there, errors.metric(), start, near);
+  descend(evaluator, there, errors.metric(), DescentOptions{}, fit);
+  joint.fit = std::move(fit.solution);
+  joint.model = there.model(joint.fit.u);
+  weigh_at(base, joint, h);
+  Index likeliest;
+  h.weighed.size_probability.maxCoeff(&likeliest);
+  const VectorXd& mean = h.weighed.mean[static_cast<std::size_t>(likeliest)];
+  const Index nuisances = mean.size() - joint.fit.u.size();
+  if (nuisances == 0 || mean.tail(nuisances).cwiseAbs().maxCoeff() < far) return;
+  JointFitter fitter(evaluator, joint, base);
+  fitter.linearise();
+  fitter.descend(most_joint_steps);
+  weigh_at(base, joint, h);
+}
+
+/// The same with nothing moved and effects at their usual size; a hypothesis that is not refitted where that has no
+/// equilibrium.
+Hypothesis fit_afresh(const calibration::MeasuredScene& scene, const BaseFit& base, const Hypothesis& screened,
+                      JointFit& joint) {
+  Hypothesis h = screened;
+  h.refitted = false;
+  for (Nuisance& nuisance : joint.nuisances) nuisance.value = 0;
+  try {
+    calibration::Evaluator evaluator(scene, joint.parameters->base(), accurate_enough());
+    JointFitter fitter(evaluator, joint, base);
+    fitter.predict({joint.parameters->start(), joint.nuisances}, nullptr);
+    fitter.linearise();
+    fitter.descend(2 * most_joint_steps);
+    weigh_at(base, joint, h);
+  } catch (const NumericalFailure&) {
+    // No equilibrium at the usual size.
+  }
+  return h;
+}
+
+bool is_misplaced(const JointFit& fit) {
+  return std::any_of(fit.nuisances.begin(), fit.nuisances.end(),
+                     [](const Nuisance& nuisance) { return std::abs(nuisance.value) > misplaced; });
+}
+
+/// The likelier fit of the one that goes on from an earlier fit and, where lines did not lead there, one that begins
+/// afresh.
+bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& from,
+              const std::vector<Candidate>& candidates, const Hypothesis& screened, Refit& result) {
+  const JointFit unfitted = result.joint;
+  Hypothesis& h = result.hypothesis = screened;
+  try {
+    fit_set(scene, base, start_of(*unfitted.parameters, from, candidates, screened), &from.fit.prediction.solution,
+            result.joint, h);
+    result.solved = true;
+  } catch (const NumericalFailure&) {
+    // No equilibrium where the screening has it.
+  }
+  const bool bent = result.solved && std::abs(screened.screened - h.ln_evidence) > lines_bend_at;
+  if (screened.drawn_at < 0 && !bent && !is_misplaced(from)) return result.solved;
+  JointFit other = unfitted;
+  other.fit.mask = base.fit.mask;
+  Hypothesis afresh = fit_afresh(scene, base, screened, other);
+  if (afresh.refitted && (!result.solved || afresh.ln_evidence > h.ln_evidence)) {
+    result.joint = std::move(other);
+    h = std::move(afresh);
+    result.solved = true;
+  }
+  return result.solved;
+}
+
+}  // namespace
+
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
-            const std::vector<Candidate>& candidates, const Hypothesis& screened) {
+            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened) {
   Refit result;
   simulation::Model model = given;
   for (const int effect : screened.effects) {
     result.effects.push_back(candidates[static_cast<std::size_t>(effect)].effect);
     model.effects.push_back(free_setting(result.effects.back()));
   }
-  const std::vector<Nuisance> nuisances = kept(base, result.effects);
-  std::vector<std::string> poses{scene.prone.name};
-  for (const auto* measurement : scene.measurements) poses.push_back(measurement->pose.name);
-  const FreeParameters parameters(with_nuisances(model, nuisances, poses));
-  const FitErrors errors(base, nuisances, base.size_of(screened.weighed));
-  try {
-    calibration::Evaluator evaluator(scene, parameters.base(), accurate_enough());
-    WeightedFit fit = weigh(evaluator, parameters, errors.metric(), start_of(parameters, base, candidates, screened),
-                            &base.fit.prediction.solution);
-    descend(evaluator, parameters, errors.metric(), DescentOptions{}, fit);
-    result.fit = std::move(fit.solution);
-  } catch (const NumericalFailure&) {
-    return result;  // no equilibrium where the screening has it
-  }
-  result.solved = true;
-  result.hypothesis = screened;
-  weigh_at(base, nuisances, parameters, result);
-  const Curved curved = curved_strengths({scene, base, errors.metric(), nuisances}, candidates, parameters, result);
-  result.model = FreeParameters(model).model(result.fit.u);
-  result.parameters = parameters_of(result, parameters, curved);
+  result.joint.parameters.emplace(model);
+  result.joint.nuisances = kept(from, result.effects);
+  result.joint.size_mm = base.size_of(screened.weighed);
+  if (!find_fit(scene, base, from, candidates, screened, result)) return result;
+  JointFit& joint = result.joint;
+  const FreeParameters there(with_nuisances(model, joint.nuisances, poses_of(scene)));
+  const FitErrors errors(base, joint.nuisances, joint.size_mm);
+  const Curved curved = curved_strengths({scene, base, errors.metric(), joint.nuisances}, candidates, there, result);
+  result.model = joint.parameters->model(joint.fit.u);
+  result.parameters = parameters_of(result, there, curved);
   result.at_border = is_at_border(result.parameters);
   result.rms_mm =
-      rms(distances_at_posterior(base, result.hypothesis, result.fit.residuals).head(result.fit.residuals.skin_rows()));
-  result.held_out_rms_mm = held_out_rms(base, result.hypothesis, result.fit.residuals);
+      rms(distances_at_posterior(base, result.hypothesis, joint.fit.residuals).head(joint.fit.residuals.skin_rows()));
+  result.held_out_rms_mm = held_out_rms(base, result.hypothesis, joint.fit.residuals);
   return result;
 }
 

@@ -31,7 +31,7 @@ struct Refit {
   std::vector<FittedParameter> parameters;  ///< of the effects
   Hypothesis hypothesis;                    ///< weighed there, without its probability
   simulation::Model model;                  ///< with the effects and the fitted numbers, without nuisances
-  calibration::Fit fit;
+  JointFit joint;                           ///< where it ended
 };
 
 /// The effect with its strengths free from @ref strength_prior and its place and shape free from the catalogue's
@@ -40,9 +40,16 @@ simulation::EffectSetting free_setting(const std::string& effect);
 
 /// Follows a screened hypothesis through the chain: Levenberg-Marquardt in moduli, strengths (in their logarithm where
 /// that is their prior), places and widths from where the screening has them, nuisances and discrepancy as errors, at
-/// the size of the discrepancy that the screening has likeliest. Laplace's evidence there for every size.
-/// @param given  the base model: where its priors stand
+/// the size of the discrepancy that the screening has likeliest. Where a nuisance ends further than a standard
+/// deviation from where it stood, its shape holds no more: then they are fitted as well (joint_fit.h). Laplace's
+/// evidence there for every size.
+///
+/// A second fit begins with effects at their usual size and nothing moved, and the likelier of both is kept, where the
+/// first ends far from what lines promise, where @p screened was drawn from a refit, and where @p from had to move what
+/// is never known by more than two standard deviations: a strength that begins near zero may stay there.
+/// @param given     the base model: where its priors stand
+/// @param from      the fit at which @p screened was drawn: the base fit, or a refit of a part of the set
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
-            const std::vector<Candidate>& candidates, const Hypothesis& screened);
+            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened);
 
 }  // namespace supine::diagnosis

@@ -50,8 +50,8 @@ class Walker {
     std::vector<int> rows = h.rows;
     rows.erase(rows.begin() + k_);
     const Weighed weighed = h.evidence->weigh(rows);
-    const double u = refit_.fit.u[k_];
-    const VectorXd others = without(refit_.fit.u);
+    const double u = refit_.joint.fit.u[k_];
+    const VectorXd others = without(refit_.joint.fit.u);
     return {u, weighed.ln_evidence + ln_normal(u, prior_), others + likeliest(weighed, others.size())};
   }
 
@@ -60,7 +60,7 @@ class Walker {
     std::vector<Place> places;
     Place before = from, last = from;
     double most = from.ln_density;
-    simulation::ChainSolution near = refit_.fit.prediction.solution;
+    simulation::ChainSolution near = refit_.joint.fit.prediction.solution;
     for (int count = 0; count < most_per_side && last.ln_density > most - fallen; ++count) {
       const double u = std::clamp(last.u + step, parameters_.lower()[k_], parameters_.upper()[k_]);
       if (std::abs(u - last.u) < 0.1 * std::abs(step)) break;  // the end of the range

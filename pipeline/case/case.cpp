@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/case/case.h"
 
-#include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -14,6 +14,7 @@
 #include "common/suggestion.h"
 #include "common/toml_reader.h"
 #include "pipeline/case/case_image.h"
+#include "simulation/catalogue.h"
 
 namespace supine::pipeline {
 namespace {
@@ -75,8 +76,19 @@ Known read_known(const TomlReader& reader, const std::string& name, const std::s
   return known;
 }
 
+std::optional<double> read_independent_points(const TomlReader& reader, const Pose& pose) {
+  constexpr double fewest = 10;
+  const auto points = reader.number("independent_points");
+  if (points && !(*points >= fewest))
+    reader.fail("independent_points", fmt::format("must be at least {:g}, not {:g}", fewest, *points));
+  if (points && !pose.noise_mm)
+    reader.fail("independent_points",
+                "needs noise_mm beside it: what points that repeat each other err cannot be seen between neighbours");
+  return points;
+}
+
 Pose read_pose(const TomlReader& reader, const std::string& name, const Case& result) {
-  std::vector<std::string> keys = {"gravity", "surface", "noise_mm", "landmarks"};
+  std::vector<std::string> keys = {"gravity", "surface", "noise_mm", "independent_points", "landmarks"};
   for (const KnownKey& row : known_keys) keys.emplace_back(row.key);
   reader.allow(keys);
   Pose pose;
@@ -90,6 +102,7 @@ Pose read_pose(const TomlReader& reader, const std::string& name, const Case& re
   if (pose.noise_mm && *pose.noise_mm > most_noise_mm)
     reader.fail("noise_mm", fmt::format("must be at most {:g} mm, not {:g}; was it meant in micrometres?",
                                         most_noise_mm, *pose.noise_mm));
+  pose.independent_points = read_independent_points(reader, pose);
   pose.known = read_known(reader, name, result.imaged_pose);
   if (pose.gravity.isZero(0) && name != result.imaged_pose && (!pose.surface || name == "supine"))
     reader.fail("gravity",
@@ -167,6 +180,17 @@ std::vector<std::string> pose_order(const TomlReader& poses, const Case& result)
     return std::pair(a.first.line, a.first.column) < std::pair(b.first.line, b.first.column);
   });
   for (auto& [position, name] : others) names.push_back(std::move(name));
+  return names;
+}
+
+std::vector<std::string> read_expected(const TomlReader& priors) {
+  const auto names = priors.texts("expected").value_or(std::vector<std::string>{});
+  for (const std::string& name : names) {
+    if (simulation::find_effect(name) != nullptr) continue;
+    std::vector<std::string> known;
+    for (const auto* effect : simulation::catalogue()) known.push_back(effect->name());
+    priors.fail("expected", fmt::format("\"{}\" is no effect of the catalogue ({})", name, fmt::join(known, ", ")));
+  }
   return names;
 }
 
@@ -297,9 +321,10 @@ Case read_case(const fs::path& folder) {
   read_calibration(file, result);
   read_register(file, result);
   if (const auto priors = file.sub_table("priors")) {
-    priors->allow({"cohort"});
-    priors->require("cohort");
-    result.cohort = case_path(*priors, "cohort", false);
+    priors->allow({"cohort", "expected"});
+    if (!priors->has("expected")) priors->require("cohort");
+    if (priors->has("cohort")) result.cohort = case_path(*priors, "cohort", false);
+    result.expected = read_expected(*priors);
   }
   return result;
 }

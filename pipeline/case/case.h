@@ -39,6 +39,8 @@ struct Pose {
   std::optional<double> noise_mm;                  ///< 1 sigma along the normal; absent = estimate it
   std::optional<std::filesystem::path> landmarks;  ///< CSV
   Known known;
+  /// How many points that err one by one the scan is worth, as noise_mm errs; absent = as many as it has.
+  std::optional<double> independent_points = {};
 };
 
 /// How supine-register lays a scan on the body.
@@ -83,6 +85,7 @@ struct Case {
   std::vector<std::string> calibrated_poses;
   RegisterOn register_on;
   std::optional<std::filesystem::path> cohort;  ///< a population's priors: a cohort.json, exists
+  std::vector<std::string> expected;            ///< effects of the catalogue that are as likely there as not
 
   const Pose& imaged() const { return poses.front(); }
   /// The pose that stands for what is predicted: supine, or the first other than the imaged one.

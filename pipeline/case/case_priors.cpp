@@ -22,13 +22,15 @@ void apply(const std::optional<double>& registration_mm, const std::optional<dou
 
 diagnosis::Priors case_priors(const Case& description, const KnownOptions& options) {
   diagnosis::Priors priors;
+  priors.expected = description.expected;
   if (const auto& said = options.segmentation_mm ? options.segmentation_mm : description.segmentation_mm)
     priors.known.segmentation_mm = *said;
   if (options.chest_wall_mm) priors.known.chest_wall_mm = *options.chest_wall_mm;
   apply(options.registration_mm, {}, priors.known);
   for (const Pose& pose : description.poses) {
     const Known& said = pose.known;
-    diagnosis::KnownOfPose own{priors.known, said.noise_shared_mm.value_or(priors.scan_shared_mm)};
+    diagnosis::KnownOfPose own{priors.known, said.noise_shared_mm.value_or(priors.scan_shared_mm),
+                               pose.independent_points};
     if (!options.registration_mm) apply(said.registration_mm, said.registration_deg, own.known);
     if (said.gravity_deg) own.known.gravity_rad = radians * *said.gravity_deg;
     if (said.breath_mm && !options.chest_wall_mm) own.known.chest_wall_mm = *said.breath_mm;

@@ -87,9 +87,34 @@ TEST(Inclusions, AreTheSumsOfSetsAndFactorsCompareOddsWithThoseOfThePrior) {
 
 TEST(PriorOfSets, IsSharedByTheSetsOfASize) {
   const Priors priors;
-  EXPECT_DOUBLE_EQ(std::exp(ln_prior_of_set(priors, 17, 0)), 0.5);
-  EXPECT_NEAR(std::exp(ln_prior_of_set(priors, 17, 2)), 0.15 / 136, 1e-12);
-  EXPECT_NEAR(std::exp(ln_prior_of_set(priors, 17, 3)), 0.05 / 680, 1e-12);
+  EXPECT_DOUBLE_EQ(std::exp(priors.ln_of_set(effects, {})), 0.5);
+  EXPECT_NEAR(std::exp(priors.ln_of_set(effects, {0, 1})), 0.15 / 136, 1e-12);
+  EXPECT_NEAR(std::exp(priors.ln_of_set(effects, {0, 1, 2})), 0.05 / 680, 1e-12);
+}
+
+TEST(PriorOfSets, WhatIsExpectedIsAsLikelyThereAsNot) {
+  Priors priors;
+  priors.expected = {"ligament", "adhesion"};
+  EXPECT_NEAR(std::exp(priors.ln_of_set(effects, {})), 0.25 * 0.5, 1e-12);
+  EXPECT_NEAR(std::exp(priors.ln_of_set(effects, {0, 1})), 0.25 * 0.5, 1e-12);
+  EXPECT_NEAR(std::exp(priors.ln_of_set(effects, {1, 4})), 0.25 * 0.3 / 15, 1e-12);
+  EXPECT_EQ(priors.of_effect(effects, "adhesion"), 0.5);
+  EXPECT_NEAR(priors.of_effect(effects, "friction"), (0.3 * 1 + 0.15 * 2 + 0.05 * 3) / 15, 1e-12);
+}
+
+TEST(Decide, WhatIsExpectedAndLeftOpenIsToldApartFromNothingElse) {
+  Priors priors;
+  priors.expected = {"ligament", "adhesion"};
+  const auto decided = [&](const std::vector<Hypothesis>& list) {
+    return decide(list, effects, inclusions(list, effects, priors), little, priors);
+  };
+  // Both tell the same story, a third one less well: neither has a Bayes factor of 3.
+  const Diagnosis open = decided(hypotheses({{{0}, 0.4}, {{1}, 0.3}, {{2}, 0.1}}));
+  EXPECT_EQ(open.verdict, Verdict::ambiguous);
+  EXPECT_EQ(open.missing, (Names{"ligament", "adhesion"}));
+  const Diagnosis found = decided(hypotheses({{{0}, 0.7}, {{0, 1}, 0.29}}));
+  EXPECT_EQ(found.missing, Names{"ligament"});
+  EXPECT_EQ(found.ambiguous_rest, Names{"adhesion"});
 }
 
 }  // namespace

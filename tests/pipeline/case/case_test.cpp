@@ -75,7 +75,7 @@ TEST_F(CaseFile, SaysWhatAScanIsLaidOn) {
 TEST_F(CaseFile, SaysHowWellMeasurementsAreKnown) {
   std::string text = replaced(good, "noise_mm = 0.7",
                               "noise_mm = 0.7\nregistration_mm = 0.4\ngravity_deg = 1\nbreath_mm = 0.5\n"
-                              "noise_shared_mm = 0.1");
+                              "noise_shared_mm = 0.1\nindependent_points = 60");
   text = replaced(text, "gravity = [0.0, 0.6, -0.8]", "gravity = [0.0, 0.6, -0.8]\nregistration_deg = 3");
   const Case c = read(replaced(text, "rim_mm = 8", "rim_mm = 8\nsegmentation_mm = 0.2"));
   constexpr double degree = std::numbers::pi / 180;
@@ -90,6 +90,8 @@ TEST_F(CaseFile, SaysHowWellMeasurementsAreKnown) {
   EXPECT_DOUBLE_EQ(tilt.registration_rad, 3 * degree);
   EXPECT_EQ(tilt.gravity_rad, defaults.known.gravity_rad);
   EXPECT_EQ(priors.scan_shared_in("tilt45"), defaults.scan_shared_mm);
+  EXPECT_EQ(priors.independent_points_in("supine"), 60);
+  EXPECT_FALSE(priors.independent_points_in("tilt45"));
   EXPECT_EQ(priors.known.segmentation_mm, 0.2);
   const diagnosis::Priors said = case_priors(c, {.registration_mm = 1, .segmentation_mm = 0.6, .chest_wall_mm = 2});
   for (const char* pose : {"supine", "tilt45"}) {

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/evidence/joint_fit.h"
+
+#include <numeric>
+
+#include "common/error.h"
+#include "common/rms.h"
+#include "diagnosis/evidence/base_fit.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using calibration::FreeParameters;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double settled = 0.3;       // of F: a further step gains no more
+constexpr double longest_step = 1.0;  // of a coordinate of a parameter: e
+constexpr int most_halvings = 4;
+constexpr double lost_mm =
+    5;  // rms: further off, closest points may lie on the wrong side of a body as slender as a bar
+constexpr double other_moduli[] = {0.5, 2, 0.7, 1.4, 0.35, 2.8, 0.25, 4};
+
+void solve(calibration::Evaluator& evaluator, const std::vector<std::string>& poses, const JointTrial& at,
+           const simulation::ChainSolution* near, const BaseFit& ground, JointFit& fit) {
+  fit.model = with_nuisances(fit.parameters->model(at.u), at.nuisances, poses);
+  fit.fit.u = at.u;
+  fit.fit.prediction = evaluator.predict(fit.model, near);
+  fit.nuisances = at.nuisances;
+  if (fit.fit.mask.empty()) fit.fit.mask = calibration::points_over_skin(fit.fit.prediction);
+  fit.fit.residuals = calibration::residuals_of(evaluator.scene(), fit.fit.prediction, fit.fit.mask, ground.noise_mm);
+  ++fit.evaluations;
+}
+
+/// Coordinates with every Young's modulus of the base model so many times as stiff.
+VectorXd scaled(const FreeParameters& parameters, VectorXd u, double times) {
+  for (Index i = 0; i < u.size(); ++i)
+    if (parameters.names()[static_cast<std::size_t>(i)].ends_with("young_modulus_kpa"))
+      u[i] = parameters.coordinate(i, times * parameters.value(i, u[i]));
+  return parameters.clamped(u);
+}
+
+/// The first prediction: from moduli at which the body is lost no step leads back, so others are tried there.
+void solve_first(calibration::Evaluator& evaluator, const std::vector<std::string>& poses, const JointTrial& at,
+                 const simulation::ChainSolution* near, const BaseFit& ground, JointFit& fit) {
+  solve(evaluator, poses, at, near, ground, fit);
+  if (rms(fit.fit.residuals.skin_mm()) < lost_mm) return;
+  const calibration::PointMask mask = fit.fit.mask;
+  JointFit best = fit;
+  for (const double times : other_moduli) {
+    JointFit trial = fit;
+    trial.fit.mask = mask;
+    try {
+      solve(evaluator, poses, {scaled(*fit.parameters, at.u, times), at.nuisances}, nullptr, ground, trial);
+    } catch (const NumericalFailure&) {
+      continue;  // no equilibrium with these
+    }
+    fit.evaluations = trial.evaluations;
+    if (rms(trial.fit.residuals.skin_mm()) < rms(best.fit.residuals.skin_mm())) best = std::move(trial);
+  }
+  const int evaluations = fit.evaluations;
+  fit = std::move(best);
+  fit.evaluations = evaluations;
+}
+
+}  // namespace
+
+JointFitter::JointFitter(calibration::Evaluator& evaluator, JointFit& fit, const BaseFit& ground)
+    : evaluator_(evaluator), fit_(fit), ground_(ground) {
+  poses_.push_back(evaluator.scene().prone.name);
+  for (const auto* measurement : evaluator.scene().measurements) poses_.push_back(measurement->pose.name);
+}
+
+JointTrial JointFitter::stepped(const VectorXd& step) const {
+  const Index own = fit_.fit.u.size();
+  JointTrial trial{fit_.parameters->clamped(fit_.fit.u + step.head(own)), fit_.nuisances};
+  for (Index k = own; k < step.size(); ++k) trial.nuisances[static_cast<std::size_t>(k - own)].value += step[k];
+  return trial;
+}
+
+double JointFitter::objective_of(const VectorXd& distances, const JointTrial& at) const {
+  double sum =
+      ground_.covariance->square(distances, fit_.size_mm) + fit_.parameters->prior_deviation(at.u).squaredNorm();
+  for (const Nuisance& nuisance : at.nuisances) sum += nuisance.value * nuisance.value;
+  return sum;
+}
+
+double JointFitter::objective() const {
+  return objective_of(ground_.distances(fit_.fit.residuals), {fit_.fit.u, fit_.nuisances});
+}
+
+void JointFitter::predict(const JointTrial& at, const simulation::ChainSolution* near) {
+  const bool first = fit_.fit.residuals.size() == 0;
+  if (first)
+    solve_first(evaluator_, poses_, at, near, ground_, fit_);
+  else
+    solve(evaluator_, poses_, at, near, ground_, fit_);
+}
+
+std::unique_ptr<simulation::Sensitivities> JointFitter::linearise() {
+  auto sensitivities =
+      std::make_unique<simulation::Sensitivities>(evaluator_.chain(), fit_.model, fit_.fit.prediction.solution);
+  const FreeParameters there(with_nuisances(fit_.parameters->base(), fit_.nuisances, poses_));
+  fit_.fit.linearisation =
+      calibration::linearise(evaluator_, *sensitivities, there, fit_.fit.u, fit_.fit.prediction, fit_.fit.residuals);
+  find_shapes(evaluator_, *sensitivities, fit_.model, fit_.fit.prediction, fit_.fit.residuals, fit_.nuisances);
+  return sensitivities;
+}
+
+bool JointFitter::improve() {
+  const VectorXd y = ground_.distances(fit_.fit.residuals);
+  const LinearEvidence evidence(*ground_.covariance, y,
+                                directions_at(fit_.fit, *fit_.parameters, fit_.nuisances, ground_.clusters));
+  std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
+  std::iota(all.begin(), all.end(), 0);
+  const Weighed weighed = evidence.weigh(all);
+  Index likeliest;
+  weighed.size_probability.maxCoeff(&likeliest);
+  fit_.size_mm = ground_.size_of(weighed);
+  VectorXd step = weighed.mean[static_cast<std::size_t>(likeliest)];
+  const double longest = step.head(fit_.fit.u.size()).cwiseAbs().maxCoeff();
+  if (longest > longest_step) step *= longest_step / longest;
+  const JointTrial now{fit_.fit.u, fit_.nuisances};
+  const double before = objective_of(y, now);
+  const double promised = before - objective_of(y + evidence.directions().columns * step, stepped(step));
+  if (promised < settled) return false;
+  const calibration::Fit kept = fit_.fit;
+  const simulation::Model kept_model = fit_.model;
+  for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
+    fit_.fit.u = kept.u, fit_.nuisances = now.nuisances;
+    const JointTrial trial = stepped(step);
+    const simulation::ChainSolution near =
+        calibration::extrapolated(kept.prediction.solution, kept.linearisation.by_coordinate, trial.u - kept.u);
+    try {
+      predict(trial, &near);
+      if (objective() < before) return true;
+    } catch (const NumericalFailure&) {
+      // No equilibrium there: a shorter step.
+    }
+  }
+  fit_.fit = kept, fit_.model = kept_model, fit_.nuisances = now.nuisances;
+  return false;
+}
+
+void JointFitter::descend(int most_steps, const std::function<void()>& before_step) {
+  for (int step = 0; step < most_steps; ++step) {
+    if (before_step) before_step();
+    if (!improve()) break;
+    linearise();
+  }
+}
+
+}  // namespace supine::diagnosis

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibration/least_squares.h"
+#include "diagnosis/evidence/nuisances.h"
+
+namespace supine::diagnosis {
+
+struct BaseFit;
+
+/// A model and all that is never known, fitted together.
+struct JointFit {
+  std::optional<calibration::FreeParameters> parameters;  ///< of the model without nuisances: where its priors stand
+  simulation::Model model;                                ///< at the optimum, nuisances at their values
+  calibration::Fit fit;                                   ///< of it
+  std::vector<Nuisance> nuisances;                        ///< at the optimum
+  double size_mm = 0;                                     ///< s of the discrepancy that is likeliest
+  int evaluations = 0;
+};
+
+/// Where a step would lead: coordinates of the free parameters, and nuisances at their values.
+struct JointTrial {
+  Eigen::VectorXd u;
+  std::vector<Nuisance> nuisances;
+};
+
+/// Gauss–Newton in the free parameters and the nuisances of a model, under the errors of a base fit: distances are
+/// exact at every step, the discrepancy is linear.
+class JointFitter {
+ public:
+  /// @param fit     its parameters, nuisances and mask are set; the mask may be empty: the points over the skin then
+  /// @param ground  whose clusters and errors count; may be @p fit itself
+  JointFitter(calibration::Evaluator& evaluator, JointFit& fit, const BaseFit& ground);
+
+  const std::vector<std::string>& poses() const { return poses_; }
+
+  /// Takes the fit to a trial. The first of all, where it is more than 5 mm off, also tries other moduli, 0.25 to 4
+  /// times as stiff, and takes the nearest: closest points of a slender body may lie on its wrong side.
+  /// @throws NumericalFailure  no equilibrium there; the fit is then at neither place
+  void predict(const JointTrial& at, const simulation::ChainSolution* near);
+  /// Slopes of parameters and nuisances at the prediction.
+  std::unique_ptr<simulation::Sensitivities> linearise();
+  /// One step, shortened until F falls. @return  whether it did by more than a little
+  bool improve();
+  /// Steps until none gains any more; slopes are those of the end.
+  void descend(int most_steps, const std::function<void()>& before_step = {});
+  /// F: distances under errors and discrepancy, priors of parameters and nuisances.
+  double objective() const;
+
+ private:
+  double objective_of(const Eigen::VectorXd& distances, const JointTrial& at) const;
+  JointTrial stepped(const Eigen::VectorXd& step) const;
+
+  calibration::Evaluator& evaluator_;
+  JointFit& fit_;
+  const BaseFit& ground_;
+  std::vector<std::string> poses_;
+};
+
+}  // namespace supine::diagnosis

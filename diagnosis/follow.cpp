@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/follow.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/error.h"
+
+namespace supine::diagnosis {
+namespace {
+
+constexpr double worth_refitting = 0.01;  // screened probability
+constexpr double held_by_refits = 0.99;   // of the screened probability
+constexpr double stands_out = 0.05;       // inclusion from which more than two sets are followed
+constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
+constexpr std::size_t singles_to_draw_from = 3, most_further = 8;
+
+/// Effects that appear in what is screened with at least some probability.
+bool something_stands_out(const Findings& found) {
+  for (std::size_t e = 0; e < found.candidates.size(); ++e)
+    if (inclusion(found.hypotheses, static_cast<int>(e)) > stands_out) return true;
+  return false;
+}
+
+bool is_open(const Hypothesis& h) { return !h.effects.empty() && !h.refitted && !h.unsolved; }
+
+/// The next hypothesis that should be followed through the chain, or nullptr.
+const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses) {
+  double sum = 0;
+  for (const Hypothesis& h : hypotheses) {
+    if (is_open(h) && h.probability >= worth_refitting) return &h;
+    sum += h.probability;
+    if (sum >= held_by_refits) break;
+  }
+  return nullptr;
+}
+
+bool is_part_of(const Hypothesis& part, const Hypothesis& whole) {
+  return std::includes(whole.effects.begin(), whole.effects.end(), part.effects.begin(), part.effects.end());
+}
+
+/// The likeliest hypothesis less one effect, not followed yet; nullptr where there is none. Straight lines do the
+/// simpler one wrong beside one that was followed.
+const Hypothesis* simpler_than_first(const std::vector<Hypothesis>& hypotheses) {
+  const Hypothesis& first = hypotheses.front();
+  if (!first.refitted || first.effects.size() < 2) return nullptr;
+  const auto found = std::find_if(hypotheses.begin(), hypotheses.end(), [&first](const Hypothesis& h) {
+    return is_open(h) && h.effects.size() + 1 == first.effects.size() && is_part_of(h, first);
+  });
+  return found == hypotheses.end() ? nullptr : &*found;
+}
+
+Hypothesis& hypothesis_of(Findings& found, const std::vector<int>& effects) {
+  return *std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
+                       [&effects](const Hypothesis& h) { return h.effects == effects; });
+}
+
+class Follower {
+ public:
+  Follower(const Subject& subject, const ExamineOptions& options, Findings& found)
+      : subject_(subject), options_(options), found_(found) {}
+
+  void run() {
+    if (options_.refits > 0) follow_expected();
+    auto most = static_cast<std::size_t>(options_.refits);
+    if (!something_stands_out(found_)) most = std::min(most, refits_when_quiet);
+    for (std::size_t simpler = 0; !bent_;) {
+      const Hypothesis* next = found_.refits.size() < most ? next_to_refit(found_.hypotheses) : nullptr;
+      if (next == nullptr && most > 0 && simpler < most_simpler)
+        next = simpler_than_first(found_.hypotheses), ++simpler;
+      if (next == nullptr) return;
+      follow_one(next->effects);
+    }
+    one_at_a_time();
+  }
+
+ private:
+  void tell(const std::string& what, const std::vector<int>& effects) const {
+    std::vector<std::string> names;
+    for (const int e : effects) names.push_back(found_.candidates[static_cast<std::size_t>(e)].effect);
+    if (options_.progress) options_.progress(fmt::format("{} {}", what, fmt::join(names, " and ")));
+  }
+
+  void weigh() {
+    lower_unfollowed(found_.hypotheses);
+    if (bent_) hold_to_parts();
+    normalise(found_.hypotheses);
+  }
+
+  void follow_one(const std::vector<int> effects) {
+    tell("refit with", effects);
+    Hypothesis& h = hypothesis_of(found_, effects);
+    const JointFit& from = h.drawn_at < 0 ? found_.base : found_.refits[static_cast<std::size_t>(h.drawn_at)].joint;
+    Refit refit = diagnosis::refit(subject_.scene, subject_.given, found_.base, from, found_.candidates, h);
+    if (refit.solved) {
+      const double promised = h.screened;
+      h = refit.hypothesis;
+      bent_ = bent_ || std::abs(promised - h.ln_evidence) > lines_bend_at;
+    } else {
+      h.unsolved = true;
+    }
+    found_.refits.push_back(std::move(refit));
+    weigh();
+  }
+
+  /// Along lines that do not hold a set is not believed to say more than its best part that was followed.
+  void hold_to_parts() {
+    for (Hypothesis& h : found_.hypotheses) {
+      if (!is_open(h) || h.drawn_at >= 0 || h.effects.size() < 2) continue;
+      double best = hypothesis_of(found_, {}).ln_evidence;
+      for (const Hypothesis& part : found_.hypotheses)
+        if (part.refitted && is_part_of(part, h)) best = std::max(best, part.ln_evidence);
+      h.ln_evidence = std::min(h.ln_evidence, best);
+    }
+  }
+
+  /// Lines from a refit to the set with each further effect, where none was drawn from a likelier part.
+  void draw_from(std::size_t at) {
+    const Refit& refit = found_.refits[at];
+    const Hypothesis part = refit.hypothesis;
+    tell("lines from", part.effects);
+    std::vector<Candidate> further;
+    try {
+      calibration::Evaluator evaluator(subject_.scene, refit.joint.model, accurate_enough());
+      std::vector<std::string> unfelt;
+      further = find_candidates(evaluator, refit.joint.model, refit.joint.fit, unfelt);
+      find_secants(subject_.scene, found_.base, refit.joint, further);
+    } catch (const NumericalFailure&) {
+      return;  // a shape without slopes
+    }
+    const auto names = found_.effects();
+    std::erase_if(further, [&names](const Candidate& c) {
+      return std::find(names.begin(), names.end(), c.effect) == names.end();
+    });
+    for (Hypothesis& drawn : screen_beside(found_.base, refit.joint, part, names, further, found_.priors)) {
+      drawn.drawn_at = static_cast<int>(at);
+      const auto same = std::find_if(found_.hypotheses.begin(), found_.hypotheses.end(),
+                                     [&drawn](const Hypothesis& h) { return h.effects == drawn.effects; });
+      if (same == found_.hypotheses.end())
+        found_.hypotheses.push_back(std::move(drawn));
+      else if (is_open(*same) && (same->drawn_at < 0 || part.ln_evidence > evidence_at(same->drawn_at)))
+        *same = std::move(drawn);
+    }
+    drawn_.push_back(at);
+    weigh();
+  }
+
+  double evidence_at(int refit) const { return found_.refits[static_cast<std::size_t>(refit)].hypothesis.ln_evidence; }
+
+  /// The refit of the likeliest hypothesis, where lines from it are of use and were not drawn yet; else the number of
+  /// refits.
+  std::size_t first_to_draw_from() const {
+    const Hypothesis& first = found_.hypotheses.front();
+    std::size_t at = 0;
+    while (at < found_.refits.size() &&
+           !(found_.refits[at].solved && found_.refits[at].hypothesis.effects == first.effects))
+      ++at;
+    const bool drawn = std::find(drawn_.begin(), drawn_.end(), at) != drawn_.end();
+    return drawn || first.effects.size() + 1 >= found_.priors.of_sets.size() ? found_.refits.size() : at;
+  }
+
+  /// Sets of what was expected, of one effect, then of two.
+  void follow_expected() {
+    std::vector<int> expected;
+    for (int e = 0; e < static_cast<int>(found_.candidates.size()); ++e)
+      if (found_.priors.is_expected(found_.candidates[static_cast<std::size_t>(e)].effect)) expected.push_back(e);
+    for (const int e : expected) follow_one({e});
+    if (expected.size() < 2) return;
+    for (std::size_t at = 0; at < expected.size(); ++at)
+      if (found_.refits[at].solved) draw_from(at);
+    for (std::size_t a = 0; a < expected.size(); ++a)
+      for (std::size_t b = a + 1; b < expected.size(); ++b) follow_one({expected[a], expected[b]});
+  }
+
+  void one_at_a_time() {
+    for (int e = 0; e < static_cast<int>(found_.candidates.size()); ++e)
+      if (is_open(hypothesis_of(found_, {e}))) follow_one({e});
+    std::vector<std::size_t> singles;
+    for (std::size_t r = 0; r < found_.refits.size(); ++r)
+      if (found_.refits[r].solved && found_.refits[r].effects.size() == 1) singles.push_back(r);
+    std::stable_sort(singles.begin(), singles.end(), [this](std::size_t a, std::size_t b) {
+      return found_.refits[a].hypothesis.ln_evidence > found_.refits[b].hypothesis.ln_evidence;
+    });
+    if (singles.size() > singles_to_draw_from) singles.resize(singles_to_draw_from);
+    for (const std::size_t at : singles)
+      if (std::find(drawn_.begin(), drawn_.end(), at) == drawn_.end()) draw_from(at);
+    for (std::size_t further = 0; further < most_further; ++further) {
+      if (const std::size_t at = first_to_draw_from(); at < found_.refits.size()) draw_from(at);
+      const Hypothesis* next = next_to_refit(found_.hypotheses);
+      if (next == nullptr) next = simpler_than_first(found_.hypotheses);
+      if (next == nullptr) return;
+      follow_one(next->effects);
+    }
+  }
+
+  const Subject& subject_;
+  const ExamineOptions& options_;
+  Findings& found_;
+  bool bent_ = false;
+  std::vector<std::size_t> drawn_;  // refits
+};
+
+}  // namespace
+
+void follow(const Subject& subject, const ExamineOptions& options, Findings& found) {
+  Follower(subject, options, found).run();
+  const auto rank = [&found](const Refit& refit) {
+    for (const Hypothesis& h : found.hypotheses)
+      if (refit.solved && h.effects == refit.hypothesis.effects) return h.probability;
+    return -1.0;
+  };
+  std::stable_sort(found.refits.begin(), found.refits.end(),
+                   [&rank](const Refit& a, const Refit& b) { return rank(a) > rank(b); });
+}
+
+}  // namespace supine::diagnosis
