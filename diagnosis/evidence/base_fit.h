@@ -22,13 +22,13 @@ namespace supine::diagnosis {
 struct BaseFit : JointFit {
   std::vector<double> noise_mm;  ///< per measurement, as given
   calibration::Clusters clusters;
-  Eigen::VectorXd noise_of_point_mm;            ///< #R, of the scanner
-  Eigen::VectorXd repeats;                      ///< #R, how many points of the scan say what one does
-  double patchiness_mm = 0;                     ///< rms that uneven tissue, skin and muscle make
-  Eigen::VectorXd mean_mm;                      ///< #R, added to the distances: what the mesh takes away
-  Eigen::MatrixXd errors;                       ///< R over the clusters, without nuisances
-  Eigen::MatrixXd patches;                      ///< what of them uneven tissue, skin and muscle make: P with P Pᵀ in R
-  Eigen::MatrixXd kernel;                       ///< K over the clusters
+  Eigen::VectorXd noise_of_point_mm;  ///< #R, of the scanner
+  Eigen::VectorXd repeats;            ///< #R, how many points of the scan say what one does
+  double patchiness_mm = 0;           ///< rms that uneven tissue, skin and muscle make
+  Eigen::VectorXd mean_mm;            ///< #R, added to the distances: what the mesh takes away
+  Eigen::MatrixXd errors;             ///< R over the clusters, without nuisances
+  Eigen::MatrixXd patches;            ///< what of them uneven tissue, skin and muscle make: P with P Pᵀ in R
+  Eigen::MatrixXd kernel;             ///< K over the clusters
   std::unique_ptr<ErrorCovariance> covariance;  ///< of both
   double scale_mm = 0, most_mm = 0;             ///< of the prior of the discrepancy's size
   std::optional<NumericalError> numerical;      ///< none: the mesh is taken to be exact

@@ -180,9 +180,9 @@ TEST(PhantomTool, CalibratedNullComesBackToItsModuli) {
   const Finished finished =
       run_process({tool("phantom"), "--effect", "null", "--seed", "1", "--rings", "7", "--voxel-mm", "2", "-o", made});
   ASSERT_EQ(finished.code, 0) << finished.err;
-  const Finished calibrated =
-      run_process({"make", "-f", std::string(SUPINE_SOURCE_DIR) + "/pipeline/Makefile", "BIN=" SUPINE_BIN_DIR,
-                   "CASE=" + made.string(), "OUT=" + out.string(), "ORDER=1", "TRIANGLES=1500", (out / "model.toml").string()});
+  const Finished calibrated = run_process({"make", "-f", std::string(SUPINE_SOURCE_DIR) + "/pipeline/Makefile",
+                                           "BIN=" SUPINE_BIN_DIR, "CASE=" + made.string(), "OUT=" + out.string(),
+                                           "ORDER=1", "TRIANGLES=1500", (out / "model.toml").string()});
   ASSERT_EQ(calibrated.code, 0) << calibrated.err;
   const Json truth = Json::parse(read_text(folder / "answers/case-001.json"))["base"];
   const Json fitted = Json::parse(read_text(out / "calibration.json"));
