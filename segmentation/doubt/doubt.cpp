@@ -47,18 +47,35 @@ bool faces_front(const FrontSkin& front, Eigen::Index i, Eigen::Index k) {
   return std::hypot(across, along) < steepest_skin;  // false for NaN
 }
 
+/// The median grey of the air in front of the chest: of a magnitude image it is that of the noise, not 0.
+double grey_of_air(const Segmented& s) {
+  std::vector<float> greys;
+  const Grid& grid = s.labels.grid;
+  for (int k = 0; k < grid.size.z(); ++k)
+    for (int j = 0; j < grid.size.y(); ++j)
+      for (int i = 0; i < grid.size.x(); ++i)
+        if (s.labels.at(i, j, k) == static_cast<std::uint8_t>(Tissue::air) &&
+            grid.point(Eigen::Vector3d(i, j, k)).y() < s.wall.torso.sternum_skin_y_mm)
+          greys.push_back(s.image.at(i, j, k));
+  if (greys.empty()) return 0;
+  const auto middle = greys.begin() + static_cast<std::ptrdiff_t>(greys.size() / 2);
+  std::nth_element(greys.begin(), middle, greys.end());
+  return *middle;
+}
+
 /// The largest patch of skin whose outside is as bright as tissue.
 void judge_skin(const Segmented& s, const FrontSkin& front, std::vector<Doubt>& doubts) {
   Grid grid;  // the columns as a picture, for its connected patches
   grid.size = {static_cast<int>(front.y_mm.rows()), static_cast<int>(front.y_mm.cols()), 1};
   Mask bright(grid.count(), 0);
   const Eigen::Vector3d ahead(0, -1, 0);
+  const double air = grey_of_air(s);
   for (int k = 0; k < grid.size.y(); ++k)
     for (int i = 0; i < grid.size.x(); ++i) {
       if (!faces_front(front, i, k)) continue;
       const Eigen::Vector3d p(front.x(i), front.y_mm(i, k), front.z(k));
-      const double out = grey_along(s.image, p, ahead, outside_from_mm, outside_to_mm),
-                   in = grey_along(s.image, p, -ahead, inside_from_mm, inside_to_mm);
+      const double out = grey_along(s.image, p, ahead, outside_from_mm, outside_to_mm) - air,
+                   in = grey_along(s.image, p, -ahead, inside_from_mm, inside_to_mm) - air;
       bright[grid.index(i, k, 0)] = in > 0 && out > signal_outside * in;
     }
   const Components patches = connected_components(bright, grid);
