@@ -95,8 +95,6 @@ class Bench {
   using State = Eigen::Matrix<double, 8, 1>;
   static constexpr int iterations = 20;
 
-  Eigen::Vector3d pivot(const Similarity& place) const { return centre_ + place.shift; }
-
   Similarity moved(const Similarity& start, const State& total) const {
     const Eigen::Vector3d turn = total.segment<3>(3);
     Similarity now = start;
