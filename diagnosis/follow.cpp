@@ -15,6 +15,7 @@ constexpr double worth_refitting = 0.01;  // screened probability
 constexpr double held_by_refits = 0.99;   // of the screened probability
 constexpr double stands_out = 0.05;       // inclusion from which more than two sets are followed
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
+constexpr double cost_of_an_idle_effect = 1;  // ln evidence, by and large
 constexpr std::size_t singles_to_draw_from = 3, most_further = 8;
 
 /// Effects that appear in what is screened with at least some probability.
@@ -70,10 +71,13 @@ class Follower {
       const Hypothesis* next = found_.refits.size() < most ? next_to_refit(found_.hypotheses) : nullptr;
       if (next == nullptr && most > 0 && simpler < most_simpler)
         next = simpler_than_first(found_.hypotheses), ++simpler;
-      if (next == nullptr) return;
+      if (next == nullptr) break;
       follow_one(next->effects);
     }
-    one_at_a_time();
+    if (bent_)
+      one_at_a_time();
+    else
+      again_from_first();
   }
 
  private:
@@ -172,6 +176,35 @@ class Follower {
       if (found_.refits[at].solved) draw_from(at);
     for (std::size_t a = 0; a < expected.size(); ++a)
       for (std::size_t b = a + 1; b < expected.size(); ++b) follow_one({expected[a], expected[b]});
+  }
+
+  /// The refit of the likeliest hypothesis with one more effect that came out worse than without, or the number of
+  /// refits: a set cannot fit worse than its part, so one that seems to ended elsewhere.
+  std::size_t worse_than_first() const {
+    const Hypothesis& first = found_.hypotheses.front();
+    const auto found = std::find_if(found_.refits.begin(), found_.refits.end(), [&first](const Refit& refit) {
+      const Hypothesis& h = refit.hypothesis;
+      return refit.solved && h.effects.size() == first.effects.size() + 1 && is_part_of(first, h) &&
+             h.ln_evidence < first.ln_evidence - cost_of_an_idle_effect;
+    });
+    return static_cast<std::size_t>(found - found_.refits.begin());
+  }
+
+  /// Such a set is followed once more, along lines from the likeliest; the likelier of both fits is kept.
+  void again_from_first() {
+    const std::size_t from = first_to_draw_from(), worse = worse_than_first();
+    if (from >= found_.refits.size() || worse >= found_.refits.size()) return;
+    const Hypothesis before = hypothesis_of(found_, found_.refits[worse].hypothesis.effects);
+    hypothesis_of(found_, before.effects).refitted = false;
+    draw_from(from);
+    follow_one(before.effects);
+    Hypothesis& after = hypothesis_of(found_, before.effects);
+    if (after.refitted && after.ln_evidence > before.ln_evidence)
+      std::swap(found_.refits[worse], found_.refits.back());
+    else
+      after = before;
+    found_.refits.pop_back();
+    weigh();
   }
 
   void one_at_a_time() {

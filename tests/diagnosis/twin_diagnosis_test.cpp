@@ -228,7 +228,7 @@ TEST(TwinDiagnosis, ARefitSaysThatAPlaceEndsAtTheBorderOfItsRange) {
     const int hill = static_cast<int>(std::find(names.begin(), names.end(), "chest_wall_motion") - names.begin());
     for (const Hypothesis& h : found->hypotheses)
       if (h.effects == std::vector{hill})
-        return refit(subject.scene, subject.given, found->base, found->candidates, h).at_border;
+        return refit(subject.scene, subject.given, found->base, found->base, found->candidates, h).at_border;
     return false;
   };
   EXPECT_TRUE(ends_there(0.55));
