@@ -16,7 +16,7 @@ constexpr double held_by_refits = 0.99;   // of the screened probability
 constexpr double stands_out = 0.05;       // inclusion from which more than two sets are followed
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
 constexpr double cost_of_an_idle_effect = 1;  // ln evidence, by and large
-constexpr std::size_t singles_to_draw_from = 3, most_further = 8;
+constexpr std::size_t singles_to_draw_from = 3, most_further = 8, most_where_lines_bend = 6;  // the last: times refits
 
 /// Effects that appear in what is screened with at least some probability.
 bool something_stands_out(const Findings& found) {
@@ -207,9 +207,21 @@ class Follower {
     weigh();
   }
 
+  bool may_follow_more() const {
+    return found_.refits.size() < most_where_lines_bend * static_cast<std::size_t>(options_.refits);
+  }
+
+  /// Every effect by itself, the likelier first.
+  void follow_singles() {
+    std::vector<int> singles;
+    for (const Hypothesis& h : found_.hypotheses)
+      if (is_open(h) && h.effects.size() == 1) singles.push_back(h.effects.front());
+    for (const int effect : singles)
+      if (may_follow_more()) follow_one({effect});
+  }
+
   void one_at_a_time() {
-    for (int e = 0; e < static_cast<int>(found_.candidates.size()); ++e)
-      if (is_open(hypothesis_of(found_, {e}))) follow_one({e});
+    follow_singles();
     std::vector<std::size_t> singles;
     for (std::size_t r = 0; r < found_.refits.size(); ++r)
       if (found_.refits[r].solved && found_.refits[r].effects.size() == 1) singles.push_back(r);
@@ -218,8 +230,8 @@ class Follower {
     });
     if (singles.size() > singles_to_draw_from) singles.resize(singles_to_draw_from);
     for (const std::size_t at : singles)
-      if (std::find(drawn_.begin(), drawn_.end(), at) == drawn_.end()) draw_from(at);
-    for (std::size_t further = 0; further < most_further; ++further) {
+      if (may_follow_more() && std::find(drawn_.begin(), drawn_.end(), at) == drawn_.end()) draw_from(at);
+    for (std::size_t further = 0; further < most_further && may_follow_more(); ++further) {
       if (const std::size_t at = first_to_draw_from(); at < found_.refits.size()) draw_from(at);
       const Hypothesis* next = next_to_refit(found_.hypotheses);
       if (next == nullptr) next = simpler_than_first(found_.hypotheses);

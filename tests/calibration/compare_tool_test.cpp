@@ -42,7 +42,7 @@ landmarks = "supine_landmarks.csv"
 gravity = [0, 0, -1]
 [pose.tilt]
 gravity = [0, 0.6, -0.8]
-surface = "supine.vtp"
+surface = "tilt.vtp"
 )";
 
 std::string content(const fs::path& file) {
@@ -66,6 +66,9 @@ class CompareTool : public ::testing::Test {
     std::ofstream(folder / "case.toml") << case_text;
     std::ofstream(folder / "labels.nrrd") << "not read here";
     reconstruction::write_surface(scan, folder / "supine.vtp");
+    reconstruction::Surface other_scan = scan;
+    other_scan.points.array() += 1e-3;
+    reconstruction::write_surface(other_scan, folder / "tilt.vtp");
     write_landmarks({{"nipple"}, Points(Eigen::RowVector3d(1, 2, 3))}, folder / "prone_landmarks.csv");
     write_landmarks({{"nipple"}, Points(Eigen::RowVector3d(1, 2, 3))}, folder / "supine_landmarks.csv");
     write_landmarks({{"nipple"}, Points(Eigen::RowVector3d(1, 2, 6))}, out / "supine_landmarks.csv");

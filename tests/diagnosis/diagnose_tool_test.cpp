@@ -51,7 +51,7 @@ TEST_F(DiagnoseTool, BeginsStifferWhereTheCalibratedModelCarriesNoMore) {
   write_text(soft, replaced(text, stiff, "value = 0.02, prior_sd = 1.0, lower = 0.01"));
   const Finished finished = diagnose(soft, {"--no-other-meshes"});
   ASSERT_EQ(finished.code, 0) << finished.err;
-  EXPECT_NE(finished.err.find("is taken to start from"), std::string::npos) << finished.err;
+  EXPECT_NE(finished.err.find("is where the search begins"), std::string::npos) << finished.err;
 }
 
 TEST_F(DiagnoseTool, TakesTheBodyToBeAsUnevenAsTheModelFileSays) {
