@@ -51,19 +51,33 @@ std::vector<Pose> measured_poses(const Case& c) {
   return poses;
 }
 
-/// A fit needs a shape to start from: a free modulus under which there is none is raised to one that has one.
+/// The least stiff of a few moduli from @p carries_kpa on that has an equilibrium: near the end of what a body carries
+/// one may stand on either side of a fold.
+void solve_stiffer(MeasuredCase& in, const std::vector<simulation::PoseLoad>& loads,
+                   const simulation::CarryingModulus& found) {
+  constexpr double clear_of_the_end = 1.1, stiffer = 1.3, most = 4;
+  for (double factor = clear_of_the_end;; factor *= stiffer) {
+    in.carrying_modulus_kpa = std::min(factor * found.carries_kpa, in.model.breast.young_modulus_kpa.upper);
+    const simulation::Model model = in.begin_with(in.model);
+    try {
+      in.start = simulation::Chain(in.mesh, in.anatomy, model, loads).solve(model, &found.solution);
+      return;
+    } catch (const simulation::NoEquilibrium&) {
+      if (factor * stiffer > most) throw;
+    }
+  }
+}
+
+/// A fit needs a shape to start from: where the given modulus has none, it begins with one that has one.
 void start_stiffer(Run& run, MeasuredCase& in, const std::vector<simulation::PoseLoad>& loads, double carried) {
-  constexpr double close_enough = 1.3, clear_of_the_end = 1.1;
+  constexpr double close_enough = 1.3;
   const simulation::Setting& modulus = in.model.breast.young_modulus_kpa;
   simulation::ModulusSearch search{.ratio = close_enough, .softest_kpa = modulus.value, .stiffest_kpa = modulus.upper};
-  const auto found = simulation::find_carrying_modulus(in.mesh, in.anatomy, in.model, loads, search);
+  solve_stiffer(in, loads, simulation::find_carrying_modulus(in.mesh, in.anatomy, in.model, loads, search));
   run.warn(fmt::format(
       "{}: breast.young_modulus_kpa = {:.3g} carries the body under {:.0f} % of gravity only; {:.3g}, which carries "
       "it, is where the search begins (its prior stays). supine-simulate --find-modulus finds the least",
-      in.model_file.string(), modulus.value, 100 * carried, clear_of_the_end * found.carries_kpa));
-  in.carrying_modulus_kpa = std::min(clear_of_the_end * found.carries_kpa, modulus.upper);
-  const simulation::Model stiffer = in.begin_with(in.model);
-  in.start = simulation::Chain(in.mesh, in.anatomy, stiffer, loads).solve(stiffer, &found.solution);
+      in.model_file.string(), modulus.value, 100 * carried, *in.carrying_modulus_kpa));
 }
 
 void solve_start(Run& run, MeasuredCase& in, const std::vector<Pose>& poses) {

@@ -34,13 +34,12 @@ COMMANDS = {
     "calibrate": "{case} {out}/mesh.vtu --model {case}/model.toml -o {out}/fitted",
     "sensitivity": "{case} {out}/mesh.vtu --model {case}/model.toml --samples 2 -o {out}/drawn",
     "diagnose": "{case} {out}/mesh.vtu --model {case}/model.toml -o {out}/diagnosed",
-    "warp": "{case} --dir {out} -o {out}/warped",
     "targets": "{case} {out}/mesh.vtu --no-other-meshes --no-further-scans -o {out}/found",
     "register": "{case} --shape {out}/supine.vtu -o {out}/placed",
     "model": "show {case}/model.toml",
     "report": "{case} --dir {out} -o {out}/report.html",
     "phantom": "-o {case}/made",
-    "warp": "{case} {case}/labels.nrrd -o {out}/carried",
+    "warp": "{case} -o {out}/carried",
     "cohort": "{case}/many -o {out}/pooled",
 }
 
