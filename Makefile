@@ -69,7 +69,7 @@ tools: configure
 demo: tools
 	$(run_case) CASE=samples/ligament
 	@echo
-	@echo "The RMS is well above the scanner's noise on purpose. Calibrating, and asking what the model lacks: a minute or two."
+	@echo "The RMS is well above the scanner's noise on purpose. Calibrating, and asking what the model lacks: a minute or so."
 	$(run_case) CASE=samples/ligament diagnose report
 	@echo
 	@echo "Open samples/ligament/out/report.html in a browser. To see the error fall on the body as what is missing is added:"
