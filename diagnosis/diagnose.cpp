@@ -102,8 +102,10 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
     return result;
   }
   const bool some = !included.empty() && included.front().probability > 0 &&
-                    std::any_of(included.begin(), included.end(),
-                                [](const Inclusion& one) { return one.bayes_factor >= factor_worth_naming; });
+                    std::any_of(included.begin(), included.end(), [&](const Inclusion& one) {
+                      const bool likelier_than_nothing = priors.is_expected(one.effect) && one.probability > nothing;
+                      return one.bayes_factor >= factor_worth_naming || likelier_than_nothing;
+                    });
   if ((some && nothing < nothing_unlikely) || nothing < nothing_excluded) {
     result.verdict = Verdict::ambiguous;
     const bool expected =

@@ -39,8 +39,9 @@ std::vector<Inclusion> inclusions(const std::vector<Hypothesis>& hypotheses, con
 /// The first line that holds:
 ///   missing          some effect has a probability of priors.named_at or more, and what was left out does not speak
 ///                    against it by 3 or more
-///   ambiguous        some Bayes factor is 3 or more and "nothing" has less than 0.5, or "nothing" has less than 0.25;
-///                    an expected effect that is neither found nor excluded is named with the others
+///   ambiguous        "nothing" has less than 0.5 and some Bayes factor is 3 or more or an expected effect is likelier
+///                    than nothing, or "nothing" has less than 0.25; an expected effect that is neither found nor
+///                    excluded is named with the others
 ///   unexplained      the lower end of what is unexplained is above priors.unexplained_bound_mm
 ///   nothing_missing  otherwise
 /// @param included  of these hypotheses, most probable first

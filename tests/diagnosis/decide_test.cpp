@@ -115,6 +115,10 @@ TEST(Decide, WhatIsExpectedAndLeftOpenIsToldApartFromNothingElse) {
   const Diagnosis found = decided(hypotheses({{{0}, 0.7}, {{0, 1}, 0.29}}));
   EXPECT_EQ(found.missing, Names{"ligament"});
   EXPECT_EQ(found.ambiguous_rest, Names{"adhesion"});
+  const Diagnosis likelier = decided(hypotheses({{{0}, 0.6}}));
+  EXPECT_EQ(likelier.verdict, Verdict::ambiguous);
+  EXPECT_EQ(likelier.missing, Names{"ligament"});
+  EXPECT_EQ(decided(hypotheses({{{0}, 0.45}})).verdict, Verdict::nothing_missing);
 }
 
 }  // namespace
