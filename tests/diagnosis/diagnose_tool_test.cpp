@@ -23,7 +23,7 @@ class DiagnoseTool : public testing::Test {
   Finished diagnose(const fs::path& model, const std::vector<std::string>& more) const {
     std::vector<std::string> words = {tool("diagnose"), case_.string(), (case_ / "out/mesh.vtu").string(),
                                       "--model",        model.string(), "-o",
-                                      found_.string(),  "--refit",      "1"};
+                                      found_.string(),  "--refit",      "0"};
     words.insert(words.end(), more.begin(), more.end());
     return run_process(words);
   }
