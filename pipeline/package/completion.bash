@@ -19,7 +19,7 @@ _supine_tool() {
 }
 _supine() {
   local current=${COMP_WORDS[COMP_CWORD]}
-  local stages="segment reconstruct decimate mesh simulate register compare calibrate diagnose ladder sensitivity report summary"
+  local stages="segment reconstruct decimate mesh simulate register compare calibrate diagnose ladder sensitivity targets warp report summary"
   local variables="CASE= COHORT= OUT= TARGET= PROFILE= THREADS= TRIANGLES= MAX_DISTANCE_MM= ORDER= METHOD= SAMPLES= PARTS="
   # Bash takes "=" for a word of its own.
   if [ "$current" = "=" ] || [ "${COMP_WORDS[COMP_CWORD - 1]}" = "=" ]; then
@@ -31,7 +31,7 @@ _supine() {
   [[ "${COMPREPLY[*]}" != *= ]] || compopt -o nospace
 }
 complete -F _supine supine
-for _supine_name in segment reconstruct decimate tetrahedralise simulate compare register calibrate sensitivity diagnose model report phantom cohort; do
+for _supine_name in segment reconstruct decimate tetrahedralise simulate compare register calibrate sensitivity diagnose targets warp model report phantom cohort; do
   complete -F _supine_tool "supine-$_supine_name"
 done
 unset _supine_name
