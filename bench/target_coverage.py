@@ -16,6 +16,7 @@ import sys
 
 QUANTILE_3 = 7.814727903251178  # of chi squared with 3 degrees, 0.95
 POSE = "supine"
+ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 
 def run(binaries, tool, *words):
@@ -27,11 +28,10 @@ def run(binaries, tool, *words):
 def make(binaries, case, answer, out):
     """Mesh and regions of a case."""
     out.mkdir(parents=True, exist_ok=True)
-    if not (out / "mesh.vtu").exists():
-        run(binaries, "segment", case, "-o", out / "labels.vti")
-        run(binaries, "reconstruct", out / "labels.vti", "-o", out)
-        run(binaries, "decimate", out / "breast.vtp", "-o", out / "coarse.vtp")
-        run(binaries, "tetrahedralise", out / "coarse.vtp", out / "muscle.vtp", out / "labels.vti", "-o", out / "mesh.vtu")
+    done = subprocess.run(["make", "-f", str(ROOT / "pipeline" / "Makefile"), f"BIN={binaries}", f"CASE={case}", f"OUT={out}", "THREADS=1", "mesh"],
+                          capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"make mesh: {done.stderr.strip()[-300:]}")
     asked = []
     if "targets" in answer:
         with open(out / "asked.csv", "w", newline="", encoding="utf-8") as stream:

@@ -11,6 +11,7 @@
 #include "common/statistics.h"
 #include "diagnosis/evidence/discrepancy.h"
 #include "diagnosis/evidence/field_modes.h"
+#include "diagnosis/evidence/nuisance_words.h"
 #include "diagnosis/further_poses.h"
 #include "diagnosis/targets/further_scan.h"
 #include "diagnosis/targets/places.h"
@@ -92,11 +93,12 @@ std::vector<Shrink> shrinks_of(const ConditionedTargets& known, const std::vecto
     const double variance = known.directions_covariance(column, column);
     if (variance <= 0) continue;
     const Vector3d cross = known.with_directions.col(column).segment<3>(row);
-    all.push_back({names[k], cross.squaredNorm() / variance / own.trace()});
+    all.push_back({names[k], "knowing " + words_of(names[k]), cross.squaredNorm() / variance / own.trace()});
   }
   const Matrix3d marker =
       known.covariance.block<3, 3>(skin_row, skin_row) + marker_mm * marker_mm * Matrix3d::Identity();
-  all.push_back({"marker on the nearest skin", gone(known.covariance.block<3, 3>(row, skin_row), marker, own)});
+  all.push_back({"marker on the nearest skin", "a marker on the nearest skin",
+                 gone(known.covariance.block<3, 3>(row, skin_row), marker, own)});
   return all;
 }
 
@@ -255,7 +257,7 @@ void add_further_scans(const TargetQuestion& question, const Weighing& with, Tar
       for (std::size_t p = 0; p < regions.points.size(); ++p) {
         const auto row = 3 * static_cast<Index>(p);
         const double before = now.block<3, 3>(row, row).trace(), after = then.block<3, 3>(row, row).trace();
-        regions.points[p].shrinks.push_back({"scan " + pose.name, 1 - after / before});
+        regions.points[p].shrinks.push_back({"scan " + pose.name, "a scan in " + pose.name, 1 - after / before});
       }
     } catch (const NumericalFailure&) {
       // No equilibrium in that pose: nothing can be promised.

@@ -18,8 +18,9 @@ struct Depth {
 
 /// What would make a region smaller, if it were known.
 struct Shrink {
-  std::string what;  ///< a parameter or nuisance by name, "marker on the nearest skin", or "scan " + a further pose
-  double share;      ///< of the sum of the three variances that goes away
+  std::string what;      ///< a parameter or nuisance by name, "marker on the nearest skin", or "scan " + a further pose
+  std::string in_words;  ///< "knowing where the supine scan lies, along x", "a marker on the nearest skin"
+  double share;          ///< of the sum of the three variances that goes away
 };
 
 /// Where a point of the imaged body lies in a pose, and how sure that is.

@@ -160,20 +160,30 @@ class DiagnoseTool : public Tool {
     }
   }
 
-  /// The case's own model, where it has the same free numbers.
+  /// The case's own model, where it has the same effects and free numbers.
   std::optional<simulation::Model> own_model(const simulation::Model& calibrated) const {
     const fs::path file = case_folder_ / "model.toml";
     if (!fs::exists(file)) return std::nullopt;
     const simulation::Model own = read_model(file);
-    if (simulation::free_parameters(own) != simulation::free_parameters(calibrated)) return std::nullopt;
+    const auto same_effect = [](const auto& a, const auto& b) { return a.name == b.name && a.options == b.options; };
+    if (simulation::free_parameters(own) != simulation::free_parameters(calibrated) ||
+        !std::equal(own.effects.begin(), own.effects.end(), calibrated.effects.begin(), calibrated.effects.end(),
+                    same_effect))
+      return std::nullopt;
     return own;
   }
 
-  /// Where priors stand: the case's own model where it has the same free numbers, else the calibrated one.
+  /// Where priors stand: the calibrated model, with each free number as the case's own model has it, if free there.
   simulation::Model given_model(Run& run, const MeasuredCase& measured) const {
-    const auto own = own_model(measured.model);
-    if (own) run.input(case_folder_ / "model.toml");
-    return with_population(run, measured.description, own.value_or(measured.model));
+    simulation::Model given = measured.model;
+    if (const fs::path file = case_folder_ / "model.toml"; fs::exists(file)) {
+      simulation::Model own = read_model(file);
+      run.input(file);
+      for (const std::string& name : simulation::free_parameters(given))
+        if (const simulation::Setting* prior = simulation::find_setting(own, name); prior && prior->free)
+          *simulation::find_setting(given, name) = *prior;
+    }
+    return with_population(run, measured.description, std::move(given));
   }
 
   fs::path model() const {

@@ -36,7 +36,7 @@ Json depth_json(const std::optional<Depth>& depth) {
 Json point_json(const TargetRegion& region) {
   Json axes = Json::array(), shrinks = Json::array();
   for (int k = 0; k < 3; ++k) axes.push_back(vector_json(region.axes.col(k)));
-  for (const auto& shrink : region.shrinks) shrinks.push_back({{"what", shrink.what}, {"share", shrink.share}});
+  for (const auto& shrink : region.shrinks) shrinks.push_back({{"what", shrink.what}, {"in_words", shrink.in_words}, {"share", shrink.share}});
   return {{"name", region.name},
           {"place_mm", vector_json(region.place_mm)},
           {"model_mm", vector_json(region.model_mm)},
@@ -165,7 +165,7 @@ void say_regions(const Run& run, const diagnosis::TargetQuestion& question, cons
   }
   for (const TargetRegion& r : regions.points)
     if (!r.shrinks.empty())
-      run.say(fmt::format("  {} would be surer most by: {} ({:.0f} % of the variance)", r.name, r.shrinks[0].what,
+      run.say(fmt::format("  {} would be surer most by {} ({:.0f} % of the variance)", r.name, r.shrinks[0].in_words,
                           100 * r.shrinks[0].share));
   if (regions.landmarks)
     run.say(

@@ -10,6 +10,7 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <iostream>
 #include <limits>
 #include <new>
 #include <system_error>
@@ -106,7 +107,10 @@ int tool_main(Tool& tool, int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& stopped) {
-    if (stopped.get_exit_code() == 0) return app.exit(stopped);  // --help, --version
+    if (stopped.get_exit_code() == 0) {  // --help, --version
+      app.exit(stopped);
+      return std::cout.flush() ? 0 : complain(tool, "standard output cannot be written (disk full?)", exit_bad_input);
+    }
     return complain(tool, fmt::format("{}\nRun {} --help for the options.", stopped.what(), tool.name()),
                     exit_bad_input);
   }

@@ -54,6 +54,20 @@ TEST_F(DiagnoseTool, BeginsStifferWhereTheCalibratedModelCarriesNoMore) {
   EXPECT_NE(finished.err.find("is where the search begins"), std::string::npos) << finished.err;
 }
 
+TEST_F(DiagnoseTool, ExaminesTheModelAsGivenWithItsFixedEffects) {
+  const fs::path tied = case_ / "tied.toml";
+  write_text(tied, read_text(case_ / "model.toml") +
+                       "[[effect]]\nname = \"ligament\"\nstiffness_kpa_per_mm = 0.5\noffset_mm = 0\nwidth_mm = 12\n");
+  const auto examined = [this](const fs::path& model) {
+    const Finished finished = diagnose(model, {"--no-other-meshes", "--force"});
+    EXPECT_EQ(finished.code, 0) << finished.err;
+    return Json::parse(read_text(found_ / "diagnosis.json"));
+  };
+  const Json without = examined(case_ / "model.toml"), with = examined(tied);
+  for (const Json& candidate : with.at("candidates")) EXPECT_NE(candidate.at("effect"), "ligament");
+  EXPECT_NE(with.at("base_parameters"), without.at("base_parameters"));
+}
+
 TEST_F(DiagnoseTool, TakesTheBodyToBeAsUnevenAsTheModelFileSays) {
   const auto patchiness = [this] {
     const Finished finished = diagnose({"--no-other-meshes", "--force"});

@@ -204,7 +204,7 @@ TEST_F(ToolMain, StandardOutputThatIsFullIsAnErrorAndNothingIsWritten) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     call_and_exit(arguments);
   };
-  for (const auto& more : {std::vector<std::string>{"--json"}, std::vector<std::string>{}}) {
+  for (const auto& more : {std::vector<std::string>{"--json"}, {}, {"--help"}, {"--version"}}) {
     EXPECT_EXIT(call_with_full_output(more), testing::ExitedWithCode(2), "supine-copy: error: ");
     EXPECT_EQ(files_written(), 0u);
   }

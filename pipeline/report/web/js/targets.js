@@ -2,23 +2,22 @@
 // Where points lie in each pose, how sure that is, how deep they are, and what would make them surer.
 "use strict";
 (() => {
-  const { data, el, section, number, shown, words } = supine;
+  const { data, el, section, number, shown } = supine;
 
   // What supine-targets found in a pose, or null.
   const targets_file = (pose) => `targets/${pose}_landmarks.json`;
   supine.targets_of = (pose) => data.figures[targets_file(pose)] || null;
 
-  const surer = (what) => (what.startsWith("scan ") ? "a " : what.includes("/") ? "knowing " : "") + words(what.replace("/", " ").replace(/\./g, " ").trim());
   const depth = (d) => (d ? `${number(d.mm, 1)} ± ${number(1.96 * d.sd_mm, 1)}` : "–");
   const table = (pose) => {
     const found = supine.targets_of(pose);
     const rows = found.points.map((p) => ({ point: p.name, x: p.place_mm[0], y: p.place_mm[1], z: p.place_mm[2], half_axes_mm: p.half_axes_mm, nearest_skin_mm: p.nearest_skin && p.nearest_skin.mm,
-      vertical_skin_mm: p.vertical_skin && p.vertical_skin.mm, most: p.shrinks.length ? p.shrinks[0].what : "", share: p.shrinks.length ? p.shrinks[0].share : null, p }));
+      vertical_skin_mm: p.vertical_skin && p.vertical_skin.mm, most: p.shrinks.length ? p.shrinks[0].in_words : "", share: p.shrinks.length ? p.shrinks[0].share : null, p }));
     const columns = [{ title: "point", key: "point" }, ...["x", "y", "z"].map((key) => ({ title: key, key, digits: 1 })),
       { title: "95 % region, half axes", key: "half_axes_mm", n: true, show: (v) => v.map((a) => number(a, 1)).join(", ") },
       { title: "to the nearest skin", key: "nearest_skin_mm", n: true, show: (v, row) => depth(row.p.nearest_skin) },
       { title: "straight up to the skin", key: "vertical_skin_mm", n: true, show: (v, row) => depth(row.p.vertical_skin) },
-      { title: "surer most by", key: "most", show: (v) => (v ? surer(v) : "–") }, { title: "less variance", key: "share", n: true, show: (v) => (v === null ? "–" : number(100 * v, 0) + " %") }];
+      { title: "surer most by", key: "most", show: (v) => v || "–" }, { title: "less variance", key: "share", n: true, show: (v) => (v === null ? "–" : number(100 * v, 0) + " %") }];
     const file = targets_file(pose);
     return supine.table_figure(`targets-${pose}`, `Points in ${pose}, mm`, columns, rows, { caption: el("span", {}, found.scan_counts ? "With all that was measured. " : "Nothing was measured: by what the model believes. ",
       "Unexplained ", shown(file, ["unexplained_mm"]), " mm, mesh ", shown(file, ["mesh_mm"]), found.mesh_measured ? " mm." : " mm (a usual share of the way).", " Depths with their 95 % reach.") });
