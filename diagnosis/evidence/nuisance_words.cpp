@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/evidence/nuisance_words.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <numbers>
 
 
 namespace supine::diagnosis {
@@ -41,6 +45,14 @@ std::string spoken(std::string name) {
   return name;
 }
 
+/// By how much it is off: a factor, an angle or a length.
+std::string amount(const Nuisance& nuisance) {
+  const double change = nuisance.value * nuisance.sigma;
+  if (nuisance.parameter.ends_with("_rad")) return fmt::format("{:+.1f}°", change * 180 / std::numbers::pi);
+  if (nuisance.parameter.ends_with("_mm") && !nuisance.effect.empty()) return fmt::format("{:+.1f} mm", change);
+  return fmt::format("x {:.2g}", std::exp(change));
+}
+
 }  // namespace
 
 std::string words_of(const std::string& name) {
@@ -52,6 +64,20 @@ std::string words_of(const std::string& name) {
   std::string words = known->second;
   if (const std::size_t place = words.find("{pose}"); place != std::string::npos) words.replace(place, 6, pose);
   return words;
+}
+
+std::vector<FarNuisance> far_nuisances(const std::vector<Nuisance>& nuisances) {
+  constexpr double far = 1.5;
+  std::vector<FarNuisance> list;
+  for (const Nuisance& nuisance : nuisances)
+    if (std::abs(nuisance.value) >= far && nuisance.source != "registration")
+      list.push_back({nuisance.name(),
+                      fmt::format("{}: {} ({:.1f} sigma)", words_of(nuisance.name()), amount(nuisance),
+                                  std::abs(nuisance.value)),
+                      nuisance.value});
+  std::stable_sort(list.begin(), list.end(),
+                   [](const FarNuisance& a, const FarNuisance& b) { return std::abs(a.sigma) > std::abs(b.sigma); });
+  return list;
 }
 
 }  // namespace supine::diagnosis

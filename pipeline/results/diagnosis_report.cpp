@@ -8,6 +8,7 @@
 
 #include "common/rms.h"
 #include "common/statistics.h"
+#include "diagnosis/evidence/nuisance_words.h"
 #include "diagnosis/diagnosis_file.h"
 #include "simulation/parameters.h"
 
@@ -275,6 +276,9 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
     f["base_parameters"][parameters.names()[static_cast<std::size_t>(i)]] = parameters.value(i, found.base.fit.u[i]);
   f["nuisances_sigma"] = nuisances_json(found);
+  f["unexpected"] = Json::array();
+  for (const auto& far : diagnosis::far_nuisances(found.base.nuisances))
+    f["unexpected"].push_back({{"name", far.name}, {"in_words", far.in_words}, {"sigma", far.sigma}});
   f["budget_mm"] = budget_json(found.budget);
   f["hot_spots"] = Json::array();
   for (const auto& spot : result.hot_spots)

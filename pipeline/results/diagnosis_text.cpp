@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/evidence/nuisance_words.h"
 #include "pipeline/results/diagnosis_report.h"
 
 namespace supine::pipeline {
@@ -40,6 +41,13 @@ void say_places(const Run& run, const Findings& found) {
     run.say(fmt::format("  the {} scan lies {:.1f} ± {:.1f} mm and {:.1f} ± {:.1f}° from where it was said to lie",
                         place.pose, place.shift_mm.norm(), place.sd.head<3>().norm() / std::sqrt(3.0),
                         place.turn_deg.norm(), place.sd.tail<3>().norm() / std::sqrt(3.0)));
+}
+
+/// What was expected of the body and turned out otherwise, without being called missing.
+void say_unexpected(const Run& run, const Findings& found) {
+  std::vector<std::string> words;
+  for (const auto& far : diagnosis::far_nuisances(found.base.nuisances)) words.push_back(far.in_words);
+  if (!words.empty()) run.say("  otherwise than expected, " + joined(words, "; "));
 }
 
 void say_hypotheses(const Run& run, const Findings& found) {
@@ -137,6 +145,7 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result) {
   const Findings& found = *result.found;
   const auto& b = found.budget;
   say_places(run, found);
+  say_unexpected(run, found);
   say_hypotheses(run, found);
   run.say(
       fmt::format("  residual: MAE {:.2f} mm, RMS {:.2f}, held-out {:.2f}; scan noise {:.2f}, registration {:.2f}, "

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 
 #include "diagnosis/evidence/nuisances.h"
@@ -29,6 +30,20 @@ TEST(NuisanceWords, TellEveryNuisanceApartAndNameItsPose) {
 TEST(NuisanceWords, SpellOutOtherParameters) {
   EXPECT_EQ(words_of("breast.young_modulus_kpa"), "breast young modulus");
   EXPECT_EQ(words_of("ligament.stiffness_kpa_per_mm"), "ligament stiffness");
+}
+
+TEST(FarNuisances, AreToldWithTheirSizeAndTheFurthestComesFirst) {
+  std::vector<Nuisance> all = nuisances_of({}, {"prone", "supine"}, Priors{});
+  for (Nuisance& nuisance : all) {
+    if (nuisance.name() == "/gland_stiffness.log_ratio") nuisance.value = std::log(2.0) / nuisance.sigma;
+    if (nuisance.name() == "supine/gravity_tilt.pitch_rad") nuisance.value = -1.6;
+    if (nuisance.name() == "/interface.normal_kpa_per_mm") nuisance.value = 1.4;
+    if (nuisance.name() == "supine/misregistration.shift_x_mm") nuisance.value = 5;
+  }
+  const std::vector<FarNuisance> far = far_nuisances(all);
+  ASSERT_EQ(far.size(), 2u);
+  EXPECT_EQ(far[0].in_words, "how stiff the gland is over fat: x 2 (2.3 sigma)");
+  EXPECT_EQ(far[1].in_words, "which way is down in supine, head to feet: -3.2° (1.6 sigma)");
 }
 
 }  // namespace
