@@ -141,6 +141,7 @@ class TargetsTool : public Tool {
           question_of(measured->description, measured->mesh, measured->anatomy, targets, pose);
       const TargetRegions regions = diagnosis::find_regions(question, evaluator, base, options.priors);
       warn_of_unsettled(run, regions);
+      warn_of_landmarks(run, regions, pose);
       write(run, question, regions, *base.parameters, &base.fit.prediction.solution);
     }
     return left_out_ ? Outcome::target_not_met : Outcome::done;
@@ -155,6 +156,16 @@ class TargetsTool : public Tool {
           fmt::format("the fit has not settled: a parameter would go on by {:.2g} of its logarithm. Regions are to "
                       "first order from where it stopped; start nearer with --model",
                       off));
+  }
+
+  /// Where measured landmarks lie otherwise than all else allows, so may everything between them.
+  static void warn_of_landmarks(Run& run, const TargetRegions& regions, const std::string& pose) {
+    constexpr double unlikely = 0.01;
+    if (!regions.landmarks || regions.landmarks->p_value >= unlikely) return;
+    run.warn(fmt::format("landmarks in {} lie where all else that is known does not have them (p = {:.2g}, bound {}): "
+                         "regions there are too small. Either the landmarks are wrong or the model lacks something; "
+                         "supine-diagnose asks what, and its model is given with --model",
+                         pose, regions.landmarks->p_value, unlikely));
   }
 
   Outcome by_priors(Run& run, const Case& description) {

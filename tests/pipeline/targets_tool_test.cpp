@@ -111,6 +111,11 @@ TEST_F(TargetsTool, SaysWhatLandmarksShouldBeOffAndCompareTestsThem) {
     EXPECT_GT(row["expected_mm"].get<double>(), 1.5);
     EXPECT_GE(row["off_expected_mm"].get<double>(), 0);
   }
+  EXPECT_EQ(finished.err.find("does not have them"), std::string::npos) << finished.err;
+  write_text(case_ / "supine.csv", "name,x,y,z,sigma_mm\nnipple,9,-31.5,0,0.3\nupper,-6,-24.2,24,0.3\n");
+  const Finished elsewhere = run({"--force"});
+  EXPECT_EQ(elsewhere.code, 0) << elsewhere.err;
+  expect_words(elsewhere.err, {"landmarks in supine", "p = ", "supine-diagnose", "--model"});
 }
 
 }  // namespace
