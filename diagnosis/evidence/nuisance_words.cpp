@@ -8,7 +8,6 @@
 #include <map>
 #include <numbers>
 
-
 namespace supine::diagnosis {
 namespace {
 
@@ -41,7 +40,8 @@ std::string spoken(std::string name) {
       name.resize(name.size() - unit.size());
       break;
     }
-  std::replace_if(name.begin(), name.end(), [](char c) { return c == '_' || c == '.'; }, ' ');
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == '_' || c == '.'; }, ' ');
   return name;
 }
 
@@ -71,10 +71,10 @@ std::vector<FarNuisance> far_nuisances(const std::vector<Nuisance>& nuisances) {
   std::vector<FarNuisance> list;
   for (const Nuisance& nuisance : nuisances)
     if (std::abs(nuisance.value) >= far && nuisance.source != "registration")
-      list.push_back({nuisance.name(),
-                      fmt::format("{}: {} ({:.1f} sigma)", words_of(nuisance.name()), amount(nuisance),
-                                  std::abs(nuisance.value)),
-                      nuisance.value});
+      list.push_back(
+          {nuisance.name(),
+           fmt::format("{}: {} ({:.1f} sigma)", words_of(nuisance.name()), amount(nuisance), std::abs(nuisance.value)),
+           nuisance.value});
   std::stable_sort(list.begin(), list.end(),
                    [](const FarNuisance& a, const FarNuisance& b) { return std::abs(a.sigma) > std::abs(b.sigma); });
   return list;

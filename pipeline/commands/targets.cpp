@@ -162,10 +162,11 @@ class TargetsTool : public Tool {
   static void warn_of_landmarks(Run& run, const TargetRegions& regions, const std::string& pose) {
     constexpr double unlikely = 0.01;
     if (!regions.landmarks || regions.landmarks->p_value >= unlikely) return;
-    run.warn(fmt::format("landmarks in {} lie where all else that is known does not have them (p = {:.2g}, bound {}): "
-                         "regions there are too small. Either the landmarks are wrong or the model lacks something; "
-                         "supine-diagnose asks what, and its model is given with --model",
-                         pose, regions.landmarks->p_value, unlikely));
+    run.warn(
+        fmt::format("landmarks in {} lie where all else that is known does not have them (p = {:.2g}, bound {}): "
+                    "regions there are too small. Either the landmarks are wrong or the model lacks something; "
+                    "supine-diagnose asks what, and its model is given with --model",
+                    pose, regions.landmarks->p_value, unlikely));
   }
 
   Outcome by_priors(Run& run, const Case& description) {

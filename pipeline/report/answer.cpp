@@ -144,8 +144,11 @@ void add_facts(const Json& diagnosis, const Collected& collected, Answer& answer
                                        diagnosis["unexplained95"][0].get<double>(),
                                        diagnosis["unexplained95"][1].get<double>()));
   for (const Json& place : diagnosis.value("registration", Json::array())) answer.facts.push_back(place_of_scan(place));
-  for (const Json& far : diagnosis.value("unexpected", Json::array()))
-    answer.facts.push_back("Otherwise than expected, " + far.value("in_words", "?") + ".");
+  // Where something is missing these may have stood in for it.
+  const std::string verdict = diagnosis.value("verdict", "");
+  if (verdict != "missing" && verdict != "ambiguous")
+    for (const Json& far : diagnosis.value("unexpected", Json::array()))
+      answer.facts.push_back("Otherwise than expected, " + far.value("in_words", "?") + ".");
   Json blind = Json::array();
   for (const Json& effect : diagnosis.value("cannot_see", Json::array())) blind.push_back(effect.value("effect", "?"));
   if (!blind.empty()) answer.facts.push_back("This scan could not show: " + listed(blind, "and") + ".");

@@ -8,8 +8,8 @@
 
 #include "common/rms.h"
 #include "common/statistics.h"
-#include "diagnosis/evidence/nuisance_words.h"
 #include "diagnosis/diagnosis_file.h"
+#include "diagnosis/evidence/nuisance_words.h"
 #include "simulation/parameters.h"
 
 namespace supine::pipeline {

@@ -43,8 +43,9 @@ void say_places(const Run& run, const Findings& found) {
                         place.turn_deg.norm(), place.sd.tail<3>().norm() / std::sqrt(3.0)));
 }
 
-/// What was expected of the body and turned out otherwise, without being called missing.
+/// What was expected of the body and turned out otherwise. Where something is missing it may have stood in for that.
 void say_unexpected(const Run& run, const Findings& found) {
+  if (found.diagnosis.verdict == Verdict::missing || found.diagnosis.verdict == Verdict::ambiguous) return;
   std::vector<std::string> words;
   for (const auto& far : diagnosis::far_nuisances(found.base.nuisances)) words.push_back(far.in_words);
   if (!words.empty()) run.say("  otherwise than expected, " + joined(words, "; "));

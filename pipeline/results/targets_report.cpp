@@ -36,7 +36,8 @@ Json depth_json(const std::optional<Depth>& depth) {
 Json point_json(const TargetRegion& region) {
   Json axes = Json::array(), shrinks = Json::array();
   for (int k = 0; k < 3; ++k) axes.push_back(vector_json(region.axes.col(k)));
-  for (const auto& shrink : region.shrinks) shrinks.push_back({{"what", shrink.what}, {"in_words", shrink.in_words}, {"share", shrink.share}});
+  for (const auto& shrink : region.shrinks)
+    shrinks.push_back({{"what", shrink.what}, {"in_words", shrink.in_words}, {"share", shrink.share}});
   return {{"name", region.name},
           {"place_mm", vector_json(region.place_mm)},
           {"model_mm", vector_json(region.model_mm)},
