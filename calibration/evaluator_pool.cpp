@@ -3,7 +3,9 @@
 
 #include <omp.h>
 
+#include <atomic>
 #include <exception>
+#include <mutex>
 #include <optional>
 
 #include "common/error.h"
@@ -42,8 +44,11 @@ std::vector<RunResult> EvaluatorPool::run(const std::vector<Eigen::VectorXd>& va
                                           const std::function<void(const RunResult&)>& done) {
   std::vector<RunResult> results(values.size());
   std::exception_ptr failure;
+  std::atomic<bool> stopped = false;
+  std::mutex mutex;  // no critical section: what is called there may throw
 #pragma omp parallel for schedule(dynamic) num_threads(static_cast <int>(evaluators_.size()))
   for (std::size_t i = 0; i < values.size(); ++i) {
+    if (stopped) continue;
     if (const auto known = journal.find(values[i])) {
       results[i] = *known;
       continue;
@@ -51,11 +56,12 @@ std::vector<RunResult> EvaluatorPool::run(const std::vector<Eigen::VectorXd>& va
     try {
       results[i] = evaluate(*evaluators_[static_cast<std::size_t>(omp_get_thread_num())], values[i]);
       journal.add(values[i], results[i]);
-#pragma omp critical(supine_pool_done)
-      if (done) done(results[i]);
+      const std::lock_guard lock(mutex);
+      if (done && !stopped) done(results[i]);
     } catch (...) {
-#pragma omp critical(supine_pool_failure)
-      failure = std::current_exception();
+      const std::lock_guard lock(mutex);
+      if (!stopped) failure = std::current_exception();
+      stopped = true;
     }
   }
   if (failure) std::rethrow_exception(failure);

@@ -32,6 +32,7 @@ struct CalibrationResult {
     double value, sd;
   };
   std::vector<Nuisance> nuisances;
+  int profile_runs = 0;  ///< chain runs that went into profiles
 };
 
 /// Keys as in docs/calibration.md.
