@@ -11,6 +11,7 @@
 #include "common/error.h"
 #include "pipeline/case/journal_key.h"
 #include "pipeline/case/measured_case.h"
+#include "pipeline/results/profile_table.h"
 
 namespace supine::pipeline {
 namespace {
@@ -70,6 +71,13 @@ class CalibrateTool : public Tool {
                    "(error_map.csv, error_map.vti); 0 = none")
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();
+    auto* merge = app.add_option("--merge", parts_,
+                                 "profiles.csv files of --profile-of: their intervals are taken; every free number "
+                                 "must be there");
+    app.add_option("--profile-of", options_.profile_of,
+                   "with --intervals profile: of this free number alone; may be given several times. Writes "
+                   "profiles.csv and no model")
+        ->excludes(merge);
     app.add_flag("--no-priors", no_priors_, "take prior_sd of the model for nothing");
     app.add_flag("--scan-offset", options_.scan_offset,
                  "the scan may lie elsewhere: fit its shift and turn as well (effect misregistration)");
@@ -82,11 +90,16 @@ class CalibrateTool : public Tool {
     claim_targets(run);
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
     const FreeParameters parameters = parameters_to_fit(run, *measured_, options_);
+    if (!parts_.empty()) options_.known_profiles = merged_profiles(parameters);
     if (map_ > 0 && parameters.size() < 2) throw InputError("--map needs two free parameters, the model has one");
     auto journal = options_.method == "cmaes" ? calibration::RunJournal(folder() / "calibration.runs", key())
                                               : calibration::RunJournal();
     const CalibrationResult result = calibrate(run, *measured_, parameters, options_, journal);
     if (!journal.file().empty()) run.no_longer_needed(journal.file());
+    if (!options_.profile_of.empty()) {
+      write_part(run, result);
+      return judge(run, options_, result);
+    }
     if (map_ > 0) {
       run.stage("map");
       write_map(run, parameters, result);
@@ -103,6 +116,9 @@ class CalibrateTool : public Tool {
 
   void check_options() const {
     options_.check();
+    if (!parts_.empty() && options_.intervals != "profile") throw InputError("--merge goes with --intervals profile");
+    if (!options_.profile_of.empty() && map_ > 0)
+      throw InputError("--map goes with a whole calibration, not with --profile-of");
     if (options_.method == "joint" && map_ > 0)
       throw InputError("--map goes with another method than joint; leave it out, or take --method least-squares");
   }
@@ -116,6 +132,10 @@ class CalibrateTool : public Tool {
           fmt::format("the fitted model would replace {}, which is the model to start from; name another "
                       "folder with -o",
                       start.string()));
+    if (!options_.profile_of.empty()) {
+      run.output(folder() / "profiles.csv");
+      return;
+    }
     for (const char* name : {"model.toml", "history.csv", "calibration.json"}) run.output(folder() / name);
     if (map_ > 0)
       for (const char* name : {"error_map.csv", "error_map.vti"}) run.output(folder() / name);
@@ -146,6 +166,39 @@ class CalibrateTool : public Tool {
     run.figures(history_file) = {{"rows", result.fit.history.size()}};
   }
 
+  /// What the intervals depend on: parts of another fit are not merged.
+  std::string depends_on() const {
+    return fmt::format("{} robust {} starts {} seed {} priors {} scan offset {}", key(), options_.robust_mm,
+                       options_.starts, options_.seed, options_.use_priors, options_.scan_offset);
+  }
+
+  void write_part(Run& run, const CalibrationResult& result) const {
+    run.stage("write");
+    const fs::path file = folder() / "profiles.csv";
+    std::ofstream stream(run.output(file), std::ios::binary);
+    write_profiles(result.profiles, stream);
+    run.figures(file) = {{"depends_on", depends_on()}};
+    for (const auto& [name, profile] : result.profiles)
+      run.say(fmt::format("  {} {:.4g} to {:.4g}, {} chain runs", name, profile.interval.low, profile.interval.high,
+                          profile.runs));
+  }
+
+  Profiles merged_profiles(const FreeParameters& parameters) const {
+    std::vector<std::pair<fs::path, Profiles>> parts;
+    for (const fs::path& file : parts_) {
+      parts.emplace_back(file, read_profiles(file));
+      const fs::path sidecar = fs::path(file).replace_extension(".json");
+      std::ifstream stream(sidecar);
+      const auto said = nlohmann::ordered_json::parse(stream, nullptr, false);
+      if (said.is_discarded() || said.value("depends_on", "") != depends_on())
+        throw InputError(fmt::format(
+            "{}: the part was not made by this program from this case, model, mesh, scans and options; make it again "
+            "with --profile-of",
+            sidecar.string()));
+    }
+    return merge_profiles(parts, parameters.names());
+  }
+
   static void write_history(const FreeParameters& parameters, const calibration::Fit& fit, const fs::path& file) {
     std::ofstream stream(file, std::ios::binary);
     stream << "evaluation,start";
@@ -164,6 +217,7 @@ class CalibrateTool : public Tool {
 
   fs::path case_folder_, mesh_file_, model_file_;
   CalibrateOptions options_;
+  std::vector<fs::path> parts_;
   int map_ = 0;
   bool no_priors_ = false;
   std::unique_ptr<MeasuredCase> measured_;

@@ -68,19 +68,30 @@ class Calibration {
     if (asked_.method == "joint") result.uncertainty.covariance = posterior;
     result.interval_kind = asked_.method == "joint" ? "posterior" : asked_.intervals;
     if (asked_.method == "cmaes") result.interval_kind = "linear";  // another optimum than that of the profiled cost
-    if (result.interval_kind == "profile") {
-      int runs = 0;
-      result.intervals =
-          calibration::profile_intervals(evaluator, parameters_, options, result.fit, result.uncertainty, runs);
-      result.profile_runs = runs;
-    } else {
-      result.intervals = calibration::linear_intervals(result.fit, parameters_, result.uncertainty);
-    }
+    result.intervals = calibration::linear_intervals(result.fit, parameters_, result.uncertainty);
+    if (result.interval_kind == "profile") find_profiles(evaluator, options, result);
     hold_out(options, result);
     return result;
   }
 
  private:
+  void find_profiles(Evaluator& evaluator, const calibration::FitOptions& options, CalibrationResult& result) const {
+    const auto wanted = [this](const std::string& name) {
+      return asked_.profile_of.empty() || std::count(asked_.profile_of.begin(), asked_.profile_of.end(), name) > 0;
+    };
+    for (Eigen::Index i = 0; i < parameters_.size(); ++i) {
+      const std::string& name = parameters_.names()[static_cast<std::size_t>(i)];
+      const auto known = asked_.known_profiles.find(name);
+      if (known == asked_.known_profiles.end() && !wanted(name)) continue;
+      const calibration::Profile profile =
+          known != asked_.known_profiles.end()
+              ? known->second
+              : calibration::profile_interval(evaluator, parameters_, options, result.fit, result.uncertainty, i);
+      result.profiles[name] = profile;
+      result.intervals[static_cast<std::size_t>(i)] = profile.interval;
+    }
+  }
+
   calibration::FitOptions fit_options(Evaluator& evaluator) {
     calibration::FitOptions options;
     options.robust_mm = asked_.robust_mm;
@@ -199,6 +210,8 @@ void CalibrateOptions::check() const {
   check_range("population", population, 0, 10000);
   check_range("max_evaluations", max_evaluations, 1, any);
   if (until_mae_mm) check_range("until_mae_mm", *until_mae_mm, 0, any);
+  if (!profile_of.empty() && (intervals != "profile" || method != "least-squares"))
+    throw InputError("--profile-of goes with --intervals profile and the method least-squares");
   if (!own.empty() && method != "least-squares")
     throw InputError(fmt::format("own residuals go with the method least-squares, not with {}", method));
   if (!own.empty() && intervals == "profile")
@@ -219,6 +232,10 @@ FreeParameters parameters_to_fit(Run& run, const MeasuredCase& measured, const C
   if (options.scan_offset) add_scan_offset(model);
   FreeParameters parameters(model);
   parameters.begin_with(measured.begin_with(model));
+  for (const std::string& name : options.profile_of)
+    if (std::count(parameters.names().begin(), parameters.names().end(), name) == 0)
+      throw InputError(fmt::format("--profile-of {}: the model has no such free number; it has {}", name,
+                                   listed(parameters.names())));
   return parameters;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,7 +21,9 @@ struct CalibrateOptions {
   unsigned seed = 1;
   int starts = 1;
   double robust_mm = 5;
-  int population = 0, max_evaluations = 300;  ///< cmaes
+  int population = 0, max_evaluations = 300;                        ///< cmaes
+  std::vector<std::string> profile_of = {};                         ///< profiles of these alone; empty = all
+  std::map<std::string, calibration::Profile> known_profiles = {};  ///< taken as they are, by parameter
   bool use_priors = true;
   bool scan_offset = false;                               ///< the scan's place is fitted as well
   std::vector<const calibration::OwnResidual*> own = {};  ///< least-squares: what counts beside the scans

@@ -141,10 +141,18 @@ void bind_calibration(py::module_& module) {
          std::string intervals, std::optional<double> until_mae_mm, unsigned seed, int starts, double robust_mm,
          int population, int max_evaluations, bool use_priors, bool scan_offset,
          const std::vector<py::object>& residuals, py::object progress) {
-        return calibrate(description, mesh, model,
-                         {std::move(method), std::move(intervals), until_mae_mm, seed, starts, robust_mm, population,
-                          max_evaluations, use_priors, scan_offset},
-                         residuals, std::move(progress));
+        pipeline::CalibrateOptions options;
+        options.method = std::move(method);
+        options.intervals = std::move(intervals);
+        options.until_mae_mm = until_mae_mm;
+        options.seed = seed;
+        options.starts = starts;
+        options.robust_mm = robust_mm;
+        options.population = population;
+        options.max_evaluations = max_evaluations;
+        options.use_priors = use_priors;
+        options.scan_offset = scan_offset;
+        return calibrate(description, mesh, model, std::move(options), residuals, std::move(progress));
       },
       py::arg("case"), py::arg("mesh"), py::arg("model"), py::kw_only(), py::arg("method") = "least-squares",
       py::arg("intervals") = "linear", py::arg("until_mae_mm") = py::none(), py::arg("seed") = 1, py::arg("starts") = 1,

@@ -2,6 +2,9 @@
 """supine.simulate against supine-simulate, to the last byte; and what it refuses."""
 
 import gc
+import os
+import signal
+import threading
 import unittest
 
 import numpy as np
@@ -79,6 +82,35 @@ class Simulate(SmallCase):
         with self.assertRaises(Enough):
             supine.simulate(self.case, self.mesh, self.model, progress=stop)
         self.assertTrue(supine.simulate(self.case, self.mesh, self.model).certain)
+
+    def test_ctrl_c_ends_the_run(self):
+        with self.assertRaises(KeyboardInterrupt):
+            supine.simulate(self.case, self.mesh, self.model, progress=lambda line: os.kill(os.getpid(), signal.SIGINT))
+
+    def test_other_threads_of_python_run_meanwhile(self):
+        over, turns = threading.Event(), []
+
+        def count():
+            while not over.wait(0.001):
+                turns.append(1)
+
+        counting = threading.Thread(target=count)
+        counting.start()
+        before = len(turns)
+        supine.simulate(self.case, self.mesh, self.model)
+        during = len(turns) - before
+        over.set()
+        counting.join()
+        self.assertGreater(during, 5)
+
+    def test_the_number_of_threads_changes_no_result(self):
+        self.addCleanup(supine.set_threads)
+        self.assertEqual(supine.set_threads(1), 1)
+        alone = supine.simulate(self.case, self.mesh, self.model)["supine"].copy()
+        self.assertEqual(supine.set_threads(2), 2)
+        np.testing.assert_array_equal(supine.simulate(self.case, self.mesh, self.model)["supine"], alone)
+        with self.says(supine.InputError, "threads = -1", "1024"):
+            supine.set_threads(-1)
 
     def test_refusals_are_those_of_the_tool(self):
         with self.assertRaises(supine.InputError) as wrong_pose:
