@@ -3,6 +3,7 @@
 (pipeline/tool/runtime_settings.h): without them solves are slower, and last digits may be others than the tools'."""
 
 import os
+import pathlib
 import subprocess
 import sys
 
@@ -12,14 +13,23 @@ _CORE = ("import ctypes; f = ctypes.CDLL('libopenblas.so.0').openblas_get_corena
          "print(f().decode())")
 
 
-def choose():
-    if "OMP_WAIT_POLICY" not in os.environ:
-        os.environ.setdefault("GOMP_SPINCOUNT", "1000")
-    if "OPENBLAS_CORETYPE" in os.environ or not sys.executable:
-        return
+def _fitting_kernels():
+    """OPENBLAS_CORETYPE that OpenBLAS does not find by itself on this processor, or ''."""
     # By a process of its own: once loaded here, OpenBLAS would keep what it chose.
     done = subprocess.run([sys.executable, "-I", "-S", "-c", _CORE], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
                           universal_newlines=True)
-    kernels = _settings.fitting_blas_kernels(done.stdout.strip()) if done.returncode == 0 else ""
-    if kernels:
-        os.environ["OPENBLAS_CORETYPE"] = kernels
+    return _settings.fitting_blas_kernels(done.stdout.strip()) if done.returncode == 0 else ""
+
+
+def choose():
+    """Makes the settings that the user has not made. Gives those that come too late, as VARIABLE=value."""
+    wanted = {}
+    if "OMP_WAIT_POLICY" not in os.environ and "GOMP_SPINCOUNT" not in os.environ:
+        wanted["libgomp"] = ("GOMP_SPINCOUNT", "1000")
+    if "OPENBLAS_CORETYPE" not in os.environ and sys.executable:
+        kernels = _fitting_kernels()
+        if kernels:
+            wanted["libopenblas"] = ("OPENBLAS_CORETYPE", kernels)
+    loaded = pathlib.Path("/proc/self/maps").read_text()
+    os.environ.update(wanted.values())
+    return ["=".join(setting) for library, setting in wanted.items() if library in loaded]

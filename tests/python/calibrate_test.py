@@ -4,9 +4,8 @@
 import csv
 import unittest
 
-import numpy as np
-
 import supine
+import numpy as np
 from support import CASE, MESH, SmallCase, figures, tool
 
 

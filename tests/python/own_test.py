@@ -3,9 +3,8 @@
 
 import unittest
 
-import numpy as np
-
 import supine
+import numpy as np
 from support import SmallCase
 
 

@@ -7,9 +7,8 @@ import signal
 import threading
 import unittest
 
-import numpy as np
-
 import supine
+import numpy as np
 from support import CASE, MESH, SmallCase, figures, tool
 
 

@@ -5,9 +5,8 @@ import gc
 import sys
 import unittest
 
-import numpy as np
-
 import supine
+import numpy as np
 from support import SmallCase
 
 try:
