@@ -37,8 +37,10 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/supineConfig.cmake ${CMAKE_CURRENT_BIN
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supine COMPONENT dev)
 
 # import supine.
-set(supine_python_install lib/python3/dist-packages/supine)
-install(TARGETS _supine _settings LIBRARY DESTINATION ${supine_python_install} COMPONENT python)
-install(FILES ${supine_python_files} DESTINATION ${supine_python_install} COMPONENT python)
+if(TARGET _supine)
+  set(supine_python_install lib/python3/dist-packages/supine)
+  install(TARGETS _supine _settings LIBRARY DESTINATION ${supine_python_install} COMPONENT python)
+  install(FILES ${supine_python_files} DESTINATION ${supine_python_install} COMPONENT python)
+endif()
 
 include(${CMAKE_CURRENT_LIST_DIR}/package.cmake)

@@ -87,12 +87,33 @@ auto view_as(Of of) {
   return [of](const py::object& self) { return view_of(of(self.cast<const Calibration&>().result), self); };
 }
 
-}  // namespace
-
-void bind_calibration(py::module_& module) {
+void bind_arrays(py::class_<Calibration>& bound) {
   using pipeline::CalibrationResult;
-  py::class_<Calibration>(module, "Calibration",
-                          "A calibrated model and what it is worth. R: rows of residuals, P: fitted parameters.")
+  bound
+      .def_property_readonly("residuals_mm",
+                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.distance_mm; }),
+                             "R, mm: signed distances of the scan's points, > 0 where the scan lies outside the model.")
+      .def_property_readonly("residual_places",
+                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.place; }),
+                             "R by 3, mm: the scan's points.")
+      .def_property_readonly("residual_sigma_mm",
+                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.sigma_mm; }),
+                             "R, mm: noise of the scanner.")
+      .def_property_readonly("residual_pose",
+                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.pose; }),
+                             "R: row of Case.calibrated_poses.")
+      .def_property_readonly("jacobian",
+                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.linearisation.slope; }),
+                             "R by P: mm per coordinate, ln(value) where a parameter is positive.")
+      .def_property_readonly("covariance",
+                             view_as([](const CalibrationResult& r) -> auto& { return r.uncertainty.covariance; }),
+                             "P by P, of the coordinates.");
+}
+
+void bind_class(py::module_& module) {
+  py::class_<Calibration> bound(module, "Calibration",
+                                "A calibrated model and what it is worth. R: rows of residuals, P: fitted parameters.");
+  bound
       .def_property_readonly(
           "model",
           [](const Calibration& self) {
@@ -111,30 +132,19 @@ void bind_calibration(py::module_& module) {
           },
           "The figures of calibration.json.")
       .def_property_readonly("history", &history, "By column of history.csv: a number per chain run.")
-      .def_property_readonly("residuals_mm",
-                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.distance_mm; }),
-                             "R, mm: signed distances of the scan's points, > 0 where the scan lies outside the model.")
-      .def_property_readonly("residual_places",
-                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.place; }),
-                             "R by 3, mm: the scan's points.")
-      .def_property_readonly("residual_sigma_mm",
-                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.sigma_mm; }),
-                             "R, mm: noise of the scanner.")
-      .def_property_readonly("residual_pose",
-                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.pose; }),
-                             "R: row of Case.calibrated_poses.")
-      .def_property_readonly("jacobian",
-                             view_as([](const CalibrationResult& r) -> auto& { return r.fit.linearisation.slope; }),
-                             "R by P: mm per coordinate, ln(value) where a parameter is positive.")
-      .def_property_readonly("covariance",
-                             view_as([](const CalibrationResult& r) -> auto& { return r.uncertainty.covariance; }),
-                             "P by P, of the coordinates.")
       .def("__getitem__", &shape, py::arg("shape"), "N by 3, mm: a shape of the calibrated model.")
       .def_readonly("warnings", &Calibration::warnings)
       .def("__repr__", [](const Calibration& self) {
         return fmt::format("<supine.Calibration of {}: RMS {:.2f} mm>", self.measured->description.name,
                            self.result.in_sample.rms_mm);
       });
+  bind_arrays(bound);
+}
+
+}  // namespace
+
+void bind_calibration(py::module_& module) {
+  bind_class(module);
   module.def(
       "calibrate",
       [](const pipeline::Case& description, const Mesh& mesh, const Model& model, std::string method,

@@ -66,48 +66,9 @@ void write(const Model& self, const std::filesystem::path& file, bool force) {
   outputs.commit();
 }
 
-}  // namespace
-
-void Model::replace(pipeline::ModelText text) {
-  simulation::Model model = pipeline::read_model(text);
-  text_ = std::move(text);
-  model_ = std::move(model);
-}
-
-void Model::set(const std::map<std::string, double>& values) {
-  for (const auto& [name, value] : values) setting_of(*this, name);
-  replace({text_.file, pipeline::with_values(text_, values)});
-}
-
-pipeline::CaseInputs inputs_of(const pipeline::Case& description, const Mesh& mesh, const Model& model) {
-  pipeline::CaseInputs inputs{description, model.text(), model.model(), mesh.mesh, mesh.anatomy};
-  pipeline::check_inputs(inputs);
-  return inputs;
-}
-
-void bind_model(py::module_& module) {
-  py::class_<Model>(module, "Model",
-                    "What is believed of the tissue: a model.toml.\n\n"
-                    "model[\"breast.young_modulus_kpa\"] reads a number and sets it. What is set is checked as the "
-                    "tools check the file, comments stay, and write() gives the file back.")
-      .def(py::init([](const std::filesystem::path& file) { return Model(pipeline::read_model_text(file)); }),
-           py::arg("file"), "Reads and checks a model.toml.")
-      .def_static(
-          "from_text",
-          [](std::string text, const std::filesystem::path& file) {
-            return Model({file, std::move(text)});
-          },
-          py::arg("text"), py::arg("file") = "model.toml", "A model of a text; messages name `file`.")
-      .def_property_readonly("file", [](const Model& self) { return self.text().file; })
-      .def_property_readonly(
-          "text", [](const Model& self) { return self.text().text; }, "The text of the file.")
-      .def_property_readonly(
-          "names", [](const Model& self) { return names_of(self.model()); },
-          "Names of all its numbers; each ends in its unit where it has one.")
-      .def_property_readonly(
-          "free", [](const Model& self) { return simulation::free_parameters(self.model()); },
-          "Names of what a calibration fits.")
-      .def_property_readonly("effects", &effects, "Names of its effects.")
+/// What reads and changes the model.
+void bind_numbers(py::class_<Model>& bound) {
+  bound
       .def(
           "__getitem__", [](const Model& self, const std::string& name) { return setting_of(self, name).value; },
           py::arg("name"))
@@ -139,6 +100,53 @@ void bind_model(py::module_& module) {
         return fmt::format("<supine.Model {}: {} numbers, {} effects>", self.text().file.string(),
                            names_of(self.model()).size(), self.model().effects.size());
       });
+}
+
+}  // namespace
+
+void Model::replace(pipeline::ModelText text) {
+  simulation::Model model = pipeline::read_model(text);
+  text_ = std::move(text);
+  model_ = std::move(model);
+}
+
+void Model::set(const std::map<std::string, double>& values) {
+  for (const auto& [name, value] : values) setting_of(*this, name);
+  replace({text_.file, pipeline::with_values(text_, values)});
+}
+
+pipeline::CaseInputs inputs_of(const pipeline::Case& description, const Mesh& mesh, const Model& model) {
+  pipeline::CaseInputs inputs{description, model.text(), model.model(), mesh.mesh, mesh.anatomy};
+  pipeline::check_inputs(inputs);
+  return inputs;
+}
+
+void bind_model(py::module_& module) {
+  py::class_<Model> bound(
+      module, "Model",
+      "What is believed of the tissue: a model.toml.\n\n"
+      "model[\"breast.young_modulus_kpa\"] reads a number and sets it. What is set is checked as the "
+      "tools check the file, comments stay, and write() gives the file back.");
+  bound
+      .def(py::init([](const std::filesystem::path& file) { return Model(pipeline::read_model_text(file)); }),
+           py::arg("file"), "Reads and checks a model.toml.")
+      .def_static(
+          "from_text",
+          [](std::string text, const std::filesystem::path& file) {
+            return Model({file, std::move(text)});
+          },
+          py::arg("text"), py::arg("file") = "model.toml", "A model of a text; messages name `file`.")
+      .def_property_readonly("file", [](const Model& self) { return self.text().file; })
+      .def_property_readonly(
+          "text", [](const Model& self) { return self.text().text; }, "The text of the file.")
+      .def_property_readonly(
+          "names", [](const Model& self) { return names_of(self.model()); },
+          "Names of all its numbers; each ends in its unit where it has one.")
+      .def_property_readonly(
+          "free", [](const Model& self) { return simulation::free_parameters(self.model()); },
+          "Names of what a calibration fits.")
+      .def_property_readonly("effects", &effects, "Names of its effects.");
+  bind_numbers(bound);
 }
 
 }  // namespace supine::python

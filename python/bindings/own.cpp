@@ -214,6 +214,53 @@ Eigen::VectorXd rows_of(const py::object& answer, const std::string& name) {
   return rows;
 }
 
+void bind_parameter(py::module_& module) {
+  using simulation::Parameter;
+  py::class_<Parameter>(module, "Parameter", "A number of an effect of one's own: its unit, range and prior.")
+      .def(
+          py::init(&make_parameter), py::arg("name"), py::kw_only(), py::arg("unit") = "1", py::arg("null") = 0.0,
+          py::arg("lower"), py::arg("upper"), py::arg("median") = 0.0, py::arg("spread"), py::arg("one_sided") = false,
+          py::arg("meaning") = "", py::arg("shape") = false,
+          "null: where the effect leaves the model as it is. median, spread: the prior; of one-sided numbers spread is "
+          "the standard deviation of the logarithm.")
+      .def_readonly("name", &Parameter::name)
+      .def_readonly("unit", &Parameter::unit)
+      .def_readonly("null", &Parameter::null)
+      .def_readonly("lower", &Parameter::lower)
+      .def_readonly("upper", &Parameter::upper)
+      .def_readonly("median", &Parameter::median);
+}
+
+void bind_scene(py::module_& module) {
+  using Look = const simulation::Scene&;
+  py::class_<Scene>(module, "Scene",
+                    "What an effect may look at while it is asked. C cells, S skin faces, I points of "
+                    "the interface.")
+      .def_property_readonly("pose", [](const Scene& self) { return self.open().pose; })
+      .def_property_readonly("is_imaged", [](const Scene& self) { return self.open().is_imaged(); })
+      .def_property_readonly("points", array_of([](Look s) -> const Points& { return s.mesh.points; }),
+                             "N by 3, mm: the nodes as imaged.")
+      .def_property_readonly("cells", array_of([](Look s) -> const Indices& { return s.mesh.cells; }), "C by 4 or 10.")
+      .def_property_readonly("tissue", array_of([](Look s) -> const Eigen::VectorXi& { return s.mesh.tissue; }), "C.")
+      .def_property_readonly("cell_q", array_of([](Look s) -> const Table& { return s.layout.cell_q; }),
+                             "C by 2: (lateral, head) in radii of the breast's foot.")
+      .def_property_readonly("skin_q", array_of([](Look s) -> const Table& { return s.layout.skin.q; }), "S by 2.")
+      .def_property_readonly("skin_faces",
+                             array_of([](Look s) -> const Eigen::VectorXi& { return s.layout.skin.faces; }),
+                             "S: rows of Mesh.faces.")
+      .def_property_readonly("interface_q", array_of([](Look s) -> const Table& { return s.layout.interface.q; }),
+                             "I by 2.")
+      .def(
+          "fraction",
+          [](const Scene& self, const std::string& tissue) {
+            for (int t = 0; t < segmentation::tissue_count; ++t)
+              if (tissue == segmentation::tissue_names[t])
+                return copy_of(Eigen::VectorXd(self.open().mesh.fraction.col(t)));
+            throw InputError(fmt::format("there is no tissue {}", tissue));
+          },
+          py::arg("tissue"), "C: the share of a tissue in every cell.");
+}
+
 }  // namespace
 
 PythonResidual::PythonResidual(py::object object) : object_(std::move(object)) {
@@ -257,47 +304,8 @@ void PythonResidual::check_derivative(const simulation::ChainSolution& shapes) c
 }
 
 void bind_own(py::module_& module) {
-  using simulation::Parameter;
-  py::class_<Parameter>(module, "Parameter", "A number of an effect of one's own: its unit, range and prior.")
-      .def(
-          py::init(&make_parameter), py::arg("name"), py::kw_only(), py::arg("unit") = "1", py::arg("null") = 0.0,
-          py::arg("lower"), py::arg("upper"), py::arg("median") = 0.0, py::arg("spread"), py::arg("one_sided") = false,
-          py::arg("meaning") = "", py::arg("shape") = false,
-          "null: where the effect leaves the model as it is. median, spread: the prior; of one-sided numbers spread is "
-          "the standard deviation of the logarithm.")
-      .def_readonly("name", &Parameter::name)
-      .def_readonly("unit", &Parameter::unit)
-      .def_readonly("null", &Parameter::null)
-      .def_readonly("lower", &Parameter::lower)
-      .def_readonly("upper", &Parameter::upper)
-      .def_readonly("median", &Parameter::median);
-  using Look = const simulation::Scene&;
-  py::class_<Scene>(module, "Scene",
-                    "What an effect may look at while it is asked. C cells, S skin faces, I points of "
-                    "the interface.")
-      .def_property_readonly("pose", [](const Scene& self) { return self.open().pose; })
-      .def_property_readonly("is_imaged", [](const Scene& self) { return self.open().is_imaged(); })
-      .def_property_readonly("points", array_of([](Look s) -> const Points& { return s.mesh.points; }),
-                             "N by 3, mm: the nodes as imaged.")
-      .def_property_readonly("cells", array_of([](Look s) -> const Indices& { return s.mesh.cells; }), "C by 4 or 10.")
-      .def_property_readonly("tissue", array_of([](Look s) -> const Eigen::VectorXi& { return s.mesh.tissue; }), "C.")
-      .def_property_readonly("cell_q", array_of([](Look s) -> const Table& { return s.layout.cell_q; }),
-                             "C by 2: (lateral, head) in radii of the breast's foot.")
-      .def_property_readonly("skin_q", array_of([](Look s) -> const Table& { return s.layout.skin.q; }), "S by 2.")
-      .def_property_readonly("skin_faces",
-                             array_of([](Look s) -> const Eigen::VectorXi& { return s.layout.skin.faces; }),
-                             "S: rows of Mesh.faces.")
-      .def_property_readonly("interface_q", array_of([](Look s) -> const Table& { return s.layout.interface.q; }),
-                             "I by 2.")
-      .def(
-          "fraction",
-          [](const Scene& self, const std::string& tissue) {
-            for (int t = 0; t < segmentation::tissue_count; ++t)
-              if (tissue == segmentation::tissue_names[t])
-                return copy_of(Eigen::VectorXd(self.open().mesh.fraction.col(t)));
-            throw InputError(fmt::format("there is no tissue {}", tissue));
-          },
-          py::arg("tissue"), "C: the share of a tissue in every cell.");
+  bind_parameter(module);
+  bind_scene(module);
   module.def("_add_effect", &add_effect, py::arg("effect"));
 }
 

@@ -139,9 +139,7 @@ void write(const Draws& self, const std::filesystem::path& file, bool force) {
   outputs.commit();
 }
 
-}  // namespace
-
-void bind_sensitivities(py::module_& module) {
+void bind_exact(py::module_& module) {
   py::class_<Sensitivities>(module, "Sensitivities",
                             "Exact derivatives of the shapes with respect to any number of the model or of the "
                             "catalogue, through the inverse and every pose.")
@@ -159,6 +157,9 @@ void bind_sensitivities(py::module_& module) {
   module.def("sensitivities", &sensitivities, py::arg("case"), py::arg("mesh"), py::arg("model"), py::kw_only(),
              py::arg("poses") = std::vector<std::string>(), py::arg("progress") = py::none(),
              "Solves the chain and gives what its derivatives are asked of.");
+}
+
+void bind_draws(py::module_& module) {
   py::class_<Draws>(module, "Draws",
                     "Chain runs for numbers drawn from what the model believes of them. S draws, P "
                     "parameters.")
@@ -179,6 +180,13 @@ void bind_sensitivities(py::module_& module) {
              py::arg("samples") = 1000, py::arg("law") = "prior", py::arg("seed") = 1, py::arg("progress") = py::none(),
              "Draws the free numbers and runs the chain for each draw, as supine-sensitivity does. law: prior or "
              "normal.");
+}
+
+}  // namespace
+
+void bind_sensitivities(py::module_& module) {
+  bind_exact(module);
+  bind_draws(module);
 }
 
 }  // namespace supine::python

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""supine.calibrate, sensitivities, draw and diagnose against the tools' files, to the last digit."""
+"""supine.calibrate, sensitivities and draw against the tools' files, to the last digit."""
 
 import csv
 import unittest
@@ -75,21 +75,6 @@ class Calibrate(SmallCase):
             exact.derivative("breast.young_modulus", "supine")
         with self.says(supine.InputError, "sitting", "supine"):
             exact.gradient({"sitting": J})
-
-    def test_a_diagnosis_is_that_of_the_tool(self):
-        out = self.folder / "tool"
-        model = CASE / "model.toml"
-        self.assertEqual(tool("supine-diagnose", CASE, MESH, "--model", model, "--refit", "1", "--no-other-meshes", "-o",
-                              out)[0], 0)
-        with self.assertWarnsRegex(supine.SupineWarning, "the mesh is taken to be exact"):
-            found = supine.diagnose(self.case, self.mesh, self.model, refits=1, other_meshes=False)
-        self.assertEqual(found.figures, figures(out / "diagnosis.json"))
-        self.assertEqual(found.verdict, found.figures["verdict"])
-        self.assertIn("the mesh is taken to be exact (--no-other-meshes)", found.warnings)
-        with self.assertRaises(supine.InputError) as wrong:
-            supine.diagnose(self.case, self.mesh, self.model, prior=[0.5, 0.3, 0.1, 0.05])
-        self.tool_says(wrong.exception, "supine-diagnose", CASE, MESH, "--model", model, "--prior", "0.5,0.3,0.1,0.05",
-                       "-o", out / "other")
 
 
 if __name__ == "__main__":

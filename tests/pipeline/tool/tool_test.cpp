@@ -221,8 +221,8 @@ TEST_F(ToolMain, ChecksOfNumbersSayWhatIsWanted) {
   EXPECT_EQ(said(not_below_zero(), "1,5"), "1,5 is no number from 0 up");
 }
 
-TEST(Run, GivesItsListenerEveryLineAndPrintsNone) {
-  Run run("supine-test", false, true, false, 1, nlohmann::ordered_json::object());
+TEST(RunOfATool, GivesItsListenerEveryLineAndPrintsNone) {
+  pipeline::Run run("supine-test", false, true, false, 1, nlohmann::ordered_json::object());
   std::vector<std::pair<Said, std::string>> heard;
   run.listen([&heard](Said kind, const std::string& line) { heard.emplace_back(kind, line); });
   ::testing::internal::CaptureStdout();
