@@ -76,7 +76,7 @@ demo: tools
 	@echo "  make CASE=samples/ligament ladder report"
 
 package: tools
-	@cmake --build $(BUILD) --target man_pages
+	@cmake --build $(BUILD) --parallel $(JOBS) --target man_pages python_module
 	@cd $(BUILD) && cpack -G DEB --config CPackConfig.cmake -B package
 	@rm -rf $(BUILD)/package/_CPack_Packages && ls -lh $(BUILD)/package/*.deb
 

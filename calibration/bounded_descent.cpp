@@ -199,6 +199,7 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const FitOp
   fit.prediction = state.prediction;
   fit.residuals = state.residuals;
   fit.linearisation = state.linearisation;
+  fit.own_information = state.own_information;
   fit.cost = state.cost;
 }
 

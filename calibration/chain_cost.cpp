@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "calibration/chain_cost.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -57,6 +59,8 @@ void ChainCost::warm_start(const Eigen::VectorXd& u, const Prediction& predictio
   if (linearisation != nullptr) accepted_.linearisation = *linearisation;
   trial_ = accepted_;
   trial_.residuals = residuals_of(evaluator_.scene(), prediction, mask_, options_.noise_mm);
+  trial_.own = own_rows(prediction);
+  rows_ += trial_.own.size();
   dearest_ = prediction.solution.work;
   if (options_.near != nullptr) dearest_ = std::max(dearest_, options_.near->work);
   linearise_trial();
@@ -79,6 +83,7 @@ std::optional<double> ChainCost::attempt(const Eigen::VectorXd& u) {
   }
   trial_.u = u;
   trial_.residuals = residuals_of(evaluator_.scene(), trial_.prediction, mask_, options_.noise_mm);
+  trial_.own = own_rows(trial_.prediction);
   trial_.cost = 0.5 * weighted(trial_).squaredNorm();
   note(u, false);
   return trial_.cost;
@@ -105,11 +110,45 @@ Eigen::VectorXd ChainCost::weighted(const State& state) const {
   const Residuals& r = state.residuals;
   for (Eigen::Index i = 0; i < r.size(); ++i)
     residuals[i] = robust_residual(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i];
-  Eigen::Index row = r.size();
+  residuals.segment(r.size(), state.own.size()) = state.own;
+  Eigen::Index row = r.size() + state.own.size();
   for (Eigen::Index j = 0; j < state.u.size() && row < rows_; ++j)
     if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)])
       residuals[row++] = (state.u[j] - prior->mean) / prior->sd;
   return residuals;
+}
+
+Eigen::VectorXd ChainCost::own_rows(const Prediction& prediction) const {
+  Eigen::VectorXd rows;
+  for (const OwnResidual* own : options_.own) {
+    const Eigen::VectorXd more = own->value(prediction.solution);
+    const Eigen::Index before = rows.size();
+    rows.conservativeResize(before + more.size());
+    rows.tail(more.size()) = more;
+  }
+  const Eigen::Index expected = accepted_.own.size();
+  if (accepted_.gradient.size() > 0 && rows.size() != expected)
+    throw InputError(fmt::format("own residuals: {} rows, and {} at another shape; their number must stay the same",
+                                 rows.size(), expected));
+  return rows;
+}
+
+Eigen::MatrixXd ChainCost::own_slopes(const State& state) const {
+  Eigen::MatrixXd slopes(state.own.size(), state.u.size());
+  for (Eigen::Index j = 0; j < slopes.cols(); ++j) {
+    Eigen::Index row = 0;
+    for (const OwnResidual* own : options_.own) {
+      const Eigen::VectorXd change =
+          own->change(state.prediction.solution, state.linearisation.by_coordinate[static_cast<std::size_t>(j)]);
+      if (row + change.size() > slopes.rows())
+        throw InputError(fmt::format("own residual {}: its derivative has more rows than its value", own->name()));
+      slopes.col(j).segment(row, change.size()) = change;
+      row += change.size();
+    }
+    if (row != slopes.rows())
+      throw InputError(fmt::format("own residuals: derivatives of {} rows, values of {}", row, slopes.rows()));
+  }
+  return slopes;
 }
 
 void ChainCost::accept() {
@@ -128,7 +167,12 @@ void ChainCost::linearise_trial() {
   for (Eigen::Index i = 0; i < r.size(); ++i)
     jacobian.row(i) =
         trial_.linearisation.slope.row(i) * (robust_slope(r.distance_mm[i], options_.robust_mm) / r.sigma_mm[i]);
-  Eigen::Index row = r.size();
+  const Eigen::Index own = trial_.own.size();
+  if (own > 0) {
+    jacobian.middleRows(r.size(), own) = own_slopes(trial_);
+    trial_.own_information = jacobian.middleRows(r.size(), own).transpose() * jacobian.middleRows(r.size(), own);
+  }
+  Eigen::Index row = r.size() + own;
   for (Eigen::Index j = 0; j < u.size() && row < rows_; ++j)
     if (const auto& prior = parameters_.priors()[static_cast<std::size_t>(j)]) jacobian(row++, j) = 1 / prior->sd;
   trial_.gradient = jacobian.transpose() * residuals;

@@ -30,6 +30,8 @@ class ChainCost {
     Prediction prediction;
     Residuals residuals;
     Linearisation linearisation;
+    Eigen::VectorXd own;              ///< rows of FitOptions::own
+    Eigen::MatrixXd own_information;  ///< JᵀJ of them; empty where there are none
     double cost = 0;
     Eigen::VectorXd gradient;     ///< of the cost; empty before the first point was accepted
     Eigen::MatrixXd information;  ///< JᵀJ
@@ -41,6 +43,8 @@ class ChainCost {
   void note(const Eigen::VectorXd& u, bool failed);
   Eigen::VectorXd weighted(const State& state) const;
   void linearise_trial();
+  Eigen::VectorXd own_rows(const Prediction& prediction) const;
+  Eigen::MatrixXd own_slopes(const State& state) const;
 
   Evaluator& evaluator_;
   const FreeParameters& parameters_;

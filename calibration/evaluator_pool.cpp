@@ -3,10 +3,11 @@
 
 #include <omp.h>
 
-#include <exception>
+#include <mutex>
 #include <optional>
 
 #include "common/error.h"
+#include "common/first_failure.h"
 #include "simulation/parameters.h"
 
 namespace supine::calibration {
@@ -41,24 +42,21 @@ RunResult EvaluatorPool::evaluate(Evaluator& evaluator, const Eigen::VectorXd& v
 std::vector<RunResult> EvaluatorPool::run(const std::vector<Eigen::VectorXd>& values, RunJournal& journal,
                                           const std::function<void(const RunResult&)>& done) {
   std::vector<RunResult> results(values.size());
-  std::exception_ptr failure;
-#pragma omp parallel for schedule(dynamic) num_threads(static_cast <int>(evaluators_.size()))
-  for (std::size_t i = 0; i < values.size(); ++i) {
+  FirstFailure failure;
+  std::mutex mutex;
+  const auto run_one = [&](std::size_t i) {
     if (const auto known = journal.find(values[i])) {
       results[i] = *known;
-      continue;
+      return;
     }
-    try {
-      results[i] = evaluate(*evaluators_[static_cast<std::size_t>(omp_get_thread_num())], values[i]);
-      journal.add(values[i], results[i]);
-#pragma omp critical(supine_pool_done)
-      if (done) done(results[i]);
-    } catch (...) {
-#pragma omp critical(supine_pool_failure)
-      failure = std::current_exception();
-    }
-  }
-  if (failure) std::rethrow_exception(failure);
+    results[i] = evaluate(*evaluators_[static_cast<std::size_t>(omp_get_thread_num())], values[i]);
+    journal.add(values[i], results[i]);
+    const std::lock_guard lock(mutex);
+    if (done) done(results[i]);
+  };
+#pragma omp parallel for schedule(dynamic) num_threads(static_cast <int>(evaluators_.size()))
+  for (std::size_t i = 0; i < values.size(); ++i) failure.guard([&] { run_one(i); });
+  failure.rethrow();
   return results;
 }
 

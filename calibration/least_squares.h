@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/own_residual.h"
 #include "calibration/residuals.h"
 
 namespace supine::calibration {
@@ -26,6 +27,7 @@ struct FitOptions {
   std::vector<double> noise_mm;  ///< per measurement, > 0
   const simulation::ChainSolution* near = nullptr;   ///< solution of the model's values, where it is known
   std::function<void(const FitProgress&)> progress;  ///< may be empty
+  std::vector<const OwnResidual*> own = {};          ///< that count beside the distances
 
   void check(const MeasuredScene& scene) const;  ///< @throws InputError  naming the option, its value and the bound
 };
@@ -45,7 +47,8 @@ struct Fit {
   PointMask mask;
   Residuals residuals;
   Linearisation linearisation;
-  double cost = 0;  ///< half the sum of squares of the weighted, robust residuals and the priors
+  Eigen::MatrixXd own_information;  ///< JᵀJ of FitOptions::own; empty where there is none
+  double cost = 0;  ///< half the sum of squares of the weighted, robust residuals, own ones and the priors
   bool converged = false;
   std::string message;
   int iterations = 0, evaluations = 0, failed = 0;
@@ -54,7 +57,8 @@ struct Fit {
 };
 
 /// Bounded nonlinear least squares (bounded_descent.h) on the signed distances scan → model, with exact sensitivities:
-///   min ½ Σ g(d_i)²/σ_i² + ½ Σ (u_j − m_j)²/s_j²,   ½ g(d)² = δ² (√(1 + (d/δ)²) − 1)   (pseudo-Huber, δ = robust_mm).
+///   min ½ Σ g(d_i)²/σ_i² + ½ Σ (u_j − m_j)²/s_j² + ½ ‖own‖²,   ½ g(d)² = δ² (√(1 + (d/δ)²) − 1)   (pseudo-Huber, δ =
+///   robust_mm).
 /// Which scan points take part is decided at the start of a descent and again at its end, until 99 % of them stay.
 /// A trial without equilibrium, or that takes too long to find one, is a rejected step. Each run starts at the last
 /// accepted shape, moved along the sensitivities.

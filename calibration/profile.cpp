@@ -86,25 +86,23 @@ class ProfileEnd {
 
 }  // namespace
 
-std::vector<Interval> profile_intervals(Evaluator& evaluator, const FreeParameters& parameters,
-                                        const FitOptions& options, const Fit& fit, const Uncertainty& uncertainty,
-                                        int& runs) {
-  std::vector<Interval> intervals;
-  for (Eigen::Index i = 0; i < parameters.size(); ++i) {
-    const double sd = std::sqrt(uncertainty.covariance(i, i)), reach = std::sqrt(rise_95) * sd;
-    const double target = rise_95 * uncertainty.covariance(i, i) / uncertainty.white(i, i);
-    double ends[2];
-    for (const int side : {0, 1}) {
-      const double guess = fit.u[i] + (side == 0 ? -reach : reach);
-      try {
-        ends[side] = ProfileEnd(evaluator, parameters, options, fit, uncertainty.white, i, runs).find(guess, target);
-      } catch (const NumericalFailure&) {
-        ends[side] = std::clamp(guess, parameters.lower()[i], parameters.upper()[i]);
-      }
+Profile profile_interval(Evaluator& evaluator, const FreeParameters& parameters, const FitOptions& options,
+                         const Fit& fit, const Uncertainty& uncertainty, Eigen::Index which) {
+  const double sd = std::sqrt(uncertainty.covariance(which, which)), reach = std::sqrt(rise_95) * sd;
+  const double target = rise_95 * uncertainty.covariance(which, which) / uncertainty.white(which, which);
+  Profile profile;
+  double ends[2];
+  for (const int side : {0, 1}) {
+    const double guess = fit.u[which] + (side == 0 ? -reach : reach);
+    try {
+      ends[side] =
+          ProfileEnd(evaluator, parameters, options, fit, uncertainty.white, which, profile.runs).find(guess, target);
+    } catch (const NumericalFailure&) {
+      ends[side] = std::clamp(guess, parameters.lower()[which], parameters.upper()[which]);
     }
-    intervals.push_back({parameters.value(i, ends[0]), parameters.value(i, ends[1])});
   }
-  return intervals;
+  profile.interval = {parameters.value(which, ends[0]), parameters.value(which, ends[1])};
+  return profile;
 }
 
 }  // namespace supine::calibration

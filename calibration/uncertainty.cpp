@@ -49,6 +49,7 @@ Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_pri
   result.effective_points = result.errors.effective_count(fit.residuals);
   Eigen::MatrixXd priors = Eigen::MatrixXd::Zero(parameters.size(), parameters.size());
   if (use_priors) priors.diagonal() = parameters.prior_information();
+  if (fit.own_information.size() > 0) priors += fit.own_information;  // normal about what was measured, as priors are
   const Eigen::MatrixXd data = precision * (j.transpose() * j);
   const Eigen::MatrixXd spread = precision * precision * weighted_product(result.errors, fit.residuals, j, j);
   const Closed closed(data + priors);

@@ -41,12 +41,17 @@ struct Interval {
 std::vector<Interval> linear_intervals(const Fit& fit, const FreeParameters& parameters,
                                        const Uncertainty& uncertainty);
 
-/// 95 % profile intervals: where twice the cost, minimised over all other parameters, has risen by 3.84 times the
-/// parameter's ratio of covariance to white (Chandler and Bate 2007, Pace et al. 2011), both in units of the
-/// residuals' rms. Cut at the range. Falls back to the linear end where the chain finds no equilibrium on the way.
-/// @param runs  chain runs it took, added to
-std::vector<Interval> profile_intervals(Evaluator& evaluator, const FreeParameters& parameters,
-                                        const FitOptions& options, const Fit& fit, const Uncertainty& uncertainty,
-                                        int& runs);
+/// The interval of one parameter that a profile gave, and the chain runs it took.
+struct Profile {
+  Interval interval;
+  int runs = 0;
+};
+
+/// 95 % profile interval of one parameter, which depends on no other's: where twice the cost, minimised over all other
+/// parameters, has risen by 3.84 times the parameter's ratio of covariance to white (Chandler and Bate 2007, Pace et
+/// al. 2011), both in units of the residuals' rms. Cut at the range. Falls back to the linear end where the chain finds
+/// no equilibrium on the way.
+Profile profile_interval(Evaluator& evaluator, const FreeParameters& parameters, const FitOptions& options,
+                         const Fit& fit, const Uncertainty& uncertainty, Eigen::Index which);
 
 }  // namespace supine::calibration

@@ -83,8 +83,12 @@ toml::table parse_toml(const fs::path& file) {
   if (!stream || fs::is_directory(file)) throw InputError(fmt::format("cannot read {}", file.string()));
   std::ostringstream text;
   text << stream.rdbuf();
+  return parse_toml(text.str(), file);
+}
+
+toml::table parse_toml(std::string_view text, const fs::path& file) {
   try {
-    return toml::parse(text.str(), file.string());
+    return toml::parse(text, file.string());
   } catch (const toml::parse_error& error) {
     throw InputError(fmt::format("{}:{}:{}: not valid TOML: {}", file.string(), error.source().begin.line,
                                  error.source().begin.column, error.description()));

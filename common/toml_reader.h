@@ -17,6 +17,8 @@ namespace supine {
 /// Parses a TOML file.
 /// @throws InputError  naming file, line and column: not there, not TOML, a key written twice
 toml::table parse_toml(const std::filesystem::path& file);
+/// The same of a text that is, or is to be, in @p file, which messages name.
+toml::table parse_toml(std::string_view text, const std::filesystem::path& file);
 
 /// What a number may be.
 struct Bounds {

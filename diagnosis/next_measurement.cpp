@@ -9,6 +9,7 @@
 #include "calibration/model_skin.h"
 #include "calibration/scan_motion.h"
 #include "common/error.h"
+#include "common/first_failure.h"
 #include "common/rms.h"
 #include "diagnosis/further_poses.h"
 #include "simulation/catalogue.h"
@@ -275,8 +276,7 @@ std::vector<Separation> next_measurements(const Subject& subject, const Findings
   const Slopes now = present(found, effects);
   const std::vector<Option> options = options_of(subject);
   std::vector<Separation> rated(options.size());
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t o = 0; o < options.size(); ++o) {
+  const auto rate = [&](std::size_t o) {
     try {
       const Slopes then = further(subject, found, options[o], effects, now);
       rated[o].measurement = options[o].name;
@@ -285,7 +285,11 @@ std::vector<Separation> next_measurements(const Subject& subject, const Findings
     } catch (const NumericalFailure&) {
       rated[o].measurement.clear();  // no equilibrium in that pose: nothing can be promised
     }
-  }
+  };
+  FirstFailure failure;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t o = 0; o < options.size(); ++o) failure.guard([&] { rate(o); });
+  failure.rethrow();
   for (Separation& s : rated)
     if (!s.measurement.empty()) list.push_back(std::move(s));
   std::stable_sort(list.begin(), list.end(), [](const Separation& a, const Separation& b) {

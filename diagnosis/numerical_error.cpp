@@ -7,6 +7,7 @@
 
 #include "calibration/error_model.h"
 #include "common/error.h"
+#include "common/first_failure.h"
 #include "common/rms.h"
 #include "diagnosis/other_mesh.h"
 #include "diagnosis/weighted_fit.h"
@@ -200,14 +201,17 @@ void measure_on_two(const calibration::MeasuredScene& scene, const simulation::M
     return change(fit.residuals.distance_mm,
                   distances_of(fit.residuals, predicted_on(scene, mesh, model, nullptr, enough())));
   };
+  const auto finer = [&] { result.finer_mm = on(other_mesh(*scene.mesh, *scene.anatomy, edge_share)); };
+  const auto coarser = [&] { result.coarser_mm = on(coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share)); };
+  FirstFailure failure;
 #pragma omp parallel sections
   {
 #pragma omp section
-    attempt(result.finer_failure, [&] { result.finer_mm = on(other_mesh(*scene.mesh, *scene.anatomy, edge_share)); });
+    failure.guard([&] { attempt(result.finer_failure, finer); });
 #pragma omp section
-    attempt(result.coarser_failure,
-            [&] { result.coarser_mm = on(coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share)); });
+    failure.guard([&] { attempt(result.coarser_failure, coarser); });
   }
+  failure.rethrow();
 }
 
 /// Root of a field of squares as seen around each point, over its root mean square: edges and folds err by more than

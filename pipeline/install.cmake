@@ -10,7 +10,7 @@ foreach(folder segmentation reconstruction meshing simulation calibration regist
     list(APPEND supine_libraries supine_${folder})
   endif()
 endforeach()
-set(supine_commands simulate compare model calibrate sensitivity diagnose)
+set(supine_commands simulate compare model calibrate sensitivity diagnose targets)
 set(supine_plain_tools segment reconstruct decimate tetrahedralise phantom register warp report cohort)
 
 install(TARGETS ${supine_libraries} EXPORT supine ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/supine COMPONENT dev)
@@ -35,5 +35,12 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/pipeline/supineConfig.cmake.
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/supineConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/supineConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/supineConfigVersion.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/supine COMPONENT dev)
+
+# import supine.
+if(TARGET _supine)
+  set(supine_python_install lib/python3/dist-packages/supine)
+  install(TARGETS _supine _settings LIBRARY DESTINATION ${supine_python_install} COMPONENT python)
+  install(FILES ${supine_python_files} DESTINATION ${supine_python_install} COMPONENT python)
+endif()
 
 include(${CMAKE_CURRENT_LIST_DIR}/package.cmake)

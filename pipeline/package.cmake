@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
-# cpack -G DEB (make package): supine, all that runs cases; supine-dev, all that find_package(supine) needs.
+# cpack -G DEB (make package): supine, all that runs cases; python3-supine; supine-dev, all that find_package(supine) needs.
 set(supine_share ${CMAKE_INSTALL_DATADIR}/supine)
 set(supine_all_tools)
 foreach(command ${supine_commands} ${supine_plain_tools})
@@ -38,7 +38,7 @@ set(CPACK_PACKAGE_VENDOR "Supine developers")
 set(CPACK_PACKAGE_CONTACT "Supine developers <supine@example.org>")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL tools dev)
+set(CPACK_COMPONENTS_ALL tools python dev)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
@@ -52,6 +52,14 @@ set(CPACK_COMPONENT_TOOLS_DESCRIPTION "prone breast MRI to supine shape, and whi
  Takes a prone breast MRI to the shape of the breast on the operating table,
  compares that prediction with a measured surface, and says which physical
  effect the model lacks. Research software, not a medical device.")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-supine)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3 (>= ${supine_python_version}), python3 (<< ${supine_python_next}), python3-numpy, libopenblas0-pthread")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "supine, python3-vtk9, python3-matplotlib")
+set(CPACK_COMPONENT_PYTHON_DESCRIPTION "supine for Python: prone breast MRI to supine shape
+ import supine: cases, models, predictions, calibration and diagnosis of supine,
+ with NumPy arrays.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME supine-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "supine (= ${PROJECT_VERSION}-1), cmake, g++, ninja-build | make, libeigen3-dev, libsuitesparse-dev, \

@@ -8,6 +8,7 @@ packages=(
   libeigen3-dev libsuitesparse-dev libopenblas-pthread-dev
   libvtk9-dev libcgal-dev libtet1.5-dev libopenmesh-dev libceres-dev libpagmo-dev libteem-dev libgdcm-dev libboost-dev zlib1g-dev
   libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libspdlog-dev libfmt-dev libssl-dev
+  python3-dev python3-numpy pybind11-dev
   libgtest-dev libbenchmark-dev
   xvfb libgl1-mesa-dri
 )

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "common/error.h"
+#include "common/first_failure.h"
 #include "diagnosis/weighted_fit.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
@@ -191,15 +192,14 @@ std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, c
 
 void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& at,
                   std::vector<Candidate>& candidates) {
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t c = 0; c < candidates.size(); ++c) {
+  const auto find_secant = [&](std::size_t c) {
     const auto& rows = candidates[c].parameters;
     const simulation::Parameter* row = simulation::find_parameter(rows[0].name);
-    if (rows.size() != 1 || row->median == row->null) continue;
+    if (rows.size() != 1 || row->median == row->null) return;
     simulation::Model model = at.model;
     model.effects.push_back(simulation::null_setting(*simulation::find_effect(candidates[c].effect)));
     const double usual = row->median - row->null, rest = usual - already_said(at, candidates[c].effect);
-    if (std::abs(rest) < least_rest * std::abs(usual)) continue;
+    if (std::abs(rest) < least_rest * std::abs(usual)) return;
     model.effects.back().parameters[row->name].value = row->null + rest;
     try {
       calibration::Evaluator evaluator(scene, model, accurate_enough());
@@ -209,7 +209,11 @@ void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, 
     } catch (const NumericalFailure&) {
       // No equilibrium at the usual size: the slope at the null has to do.
     }
-  }
+  };
+  FirstFailure failure;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t c = 0; c < candidates.size(); ++c) failure.guard([&] { find_secant(c); });
+  failure.rethrow();
 }
 
 }  // namespace supine::diagnosis

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "common/error.h"
+#include "common/first_failure.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -126,8 +127,11 @@ std::optional<CurvedDensity> strength_profile(const RefitGround& ground, const R
   const Walker walker(ground, refit, parameters, k);
   const Place middle = walker.start();
   std::array<std::vector<Place>, 2> sides;
+  FirstFailure failure;
 #pragma omp parallel for schedule(static, 1)
-  for (std::size_t side = 0; side < 2; ++side) sides[side] = walker.walk(middle, (side == 0 ? -stride : stride) * sd);
+  for (std::size_t side = 0; side < 2; ++side)
+    failure.guard([&] { sides[side] = walker.walk(middle, (side == 0 ? -stride : stride) * sd); });
+  failure.rethrow();
   std::vector<double> at, ln;
   const auto add = [&](const Place& place) { at.push_back(place.u), ln.push_back(place.ln_density); };
   std::for_each(sides[0].rbegin(), sides[0].rend(), add);

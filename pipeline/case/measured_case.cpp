@@ -14,9 +14,6 @@
 #include "calibration/signed_distance.h"
 #include "common/error.h"
 #include "common/landmarks.h"
-#include "meshing/imaged_mesh.h"
-#include "pipeline/case/model_checks.h"
-#include "pipeline/case/model_file.h"
 #include "pipeline/case/scan_readings.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/model_fields.h"
@@ -77,7 +74,7 @@ void start_stiffer(Run& run, MeasuredCase& in, const std::vector<simulation::Pos
   run.warn(fmt::format(
       "{}: breast.young_modulus_kpa = {:.3g} carries the body under {:.0f} % of gravity only; {:.3g}, which carries "
       "it, is where the search begins (its prior stays). supine-simulate --find-modulus finds the least",
-      in.model_file.string(), modulus.value, 100 * carried, *in.carrying_modulus_kpa));
+      in.model_text.file.string(), modulus.value, 100 * carried, *in.carrying_modulus_kpa));
 }
 
 void solve_start(Run& run, MeasuredCase& in, const std::vector<Pose>& poses) {
@@ -202,16 +199,9 @@ std::vector<double> MeasuredCase::noise_mm(calibration::Evaluator& evaluator) co
   return noise;
 }
 
-std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const fs::path& folder, const fs::path& mesh_file,
-                                                 const fs::path& model_file) {
+std::unique_ptr<MeasuredCase> measure_case(Run& run, CaseInputs inputs) {
   auto in = std::make_unique<MeasuredCase>();
-  run.input(folder / "case.toml");
-  in->description = read_case(folder);
-  in->model_file = model_file.empty() ? folder / "model.toml" : model_file;
-  in->model = read_model(run.input(in->model_file));
-  in->mesh = meshing::read_imaged_mesh(run.input(mesh_file), in->description.side);
-  in->anatomy = meshing::compute_anatomy(in->mesh, in->description.side, in->description.imaged_pose);
-  if (!in->description.is_object()) check_weight(in->model, in->anatomy, in->model_file);
+  static_cast<CaseInputs&>(*in) = std::move(inputs);
   const std::vector<Pose> poses = measured_poses(in->description);
   solve_start(run, *in, poses);
   for (std::size_t p = 0; p < poses.size(); ++p) read_scan(run, *in, poses[p], p);
@@ -219,11 +209,16 @@ std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const fs::path& folde
   return in;
 }
 
+std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const fs::path& folder, const fs::path& mesh_file,
+                                                 const fs::path& model_file) {
+  return measure_case(run, read_case_inputs(run, folder, mesh_file, model_file));
+}
+
 struct LiveProgress::State {
   const Run& run;
   std::chrono::seconds pause;
   std::mutex mutex;
-  bool terminal = isatty(STDERR_FILENO) != 0;
+  bool at_once = run.has_listener() || isatty(STDERR_FILENO) != 0;
   std::chrono::steady_clock::time_point last = std::chrono::steady_clock::now();
 };
 
@@ -232,7 +227,7 @@ LiveProgress::~LiveProgress() = default;
 
 void LiveProgress::show(const std::string& line) {
   const std::lock_guard lock(state_->mutex);
-  if (state_->terminal) return state_->run.progress(line);
+  if (state_->at_once) return state_->run.progress(line);
   const auto now = std::chrono::steady_clock::now();
   if (now - state_->last < state_->pause) return;
   state_->last = now;

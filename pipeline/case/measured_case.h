@@ -10,24 +10,15 @@
 #include <vector>
 
 #include "calibration/evaluator.h"
-#include "meshing/anatomy.h"
-#include "meshing/tet_mesh.h"
-#include "pipeline/case/case.h"
-#include "pipeline/tool/tool.h"
-#include "simulation/model.h"
+#include "pipeline/case/case_inputs.h"
 
 namespace supine::pipeline {
 
 /// A case with its mesh, a model and every measured surface, ready for distances: what calibration, sensitivity and
 /// diagnosis start from.
-struct MeasuredCase {
-  Case description;
-  std::filesystem::path model_file;
-  simulation::Model model;  ///< as given
+struct MeasuredCase : CaseInputs {
   /// breast.young_modulus_kpa to begin with, where the given one has no equilibrium.
   std::optional<double> carrying_modulus_kpa;
-  meshing::TetMesh mesh;
-  meshing::Anatomy anatomy;
   std::vector<calibration::Measurement> fitted;    ///< in the order of [calibration] poses
   std::vector<calibration::Measurement> held_out;  ///< every other measured pose
   /// Of the poses that have some, by name; without sigma_mm in either file 1.5 mm.
@@ -49,13 +40,16 @@ struct MeasuredCase {
   std::vector<double> noise_mm(calibration::Evaluator& evaluator) const;
 };
 
-/// Reads and checks all of it, and solves the model as given once, because only a predicted skin tells which side of a
-/// scan is outside and whether it lies at the body. Where there is no equilibrium under a free
-/// breast.young_modulus_kpa, what begins here begins with one under which there is, with a warning; priors stay.
+/// Reads the measurements, and solves the model as given once, because only a predicted skin tells which side of a scan
+/// is outside and whether it lies at the body. Where there is no equilibrium under a free breast.young_modulus_kpa,
+/// what begins here begins with one under which there is, with a warning; priors stay.
 /// @throws InputError  a fitted pose without a surface; no interface; side = "both" without two breasts; a scan that is
 ///   not at the body; a landmark without a place in prone; effects that can change nothing
 /// @throws NumericalFailure  no equilibrium with the model as given, and its modulus is fixed or nothing in its range
 ///   carries the body
+std::unique_ptr<MeasuredCase> measure_case(Run& run, CaseInputs inputs);
+
+/// The same of files: read_case_inputs().
 std::unique_ptr<MeasuredCase> read_measured_case(Run& run, const std::filesystem::path& folder,
                                                  const std::filesystem::path& mesh_file,
                                                  const std::filesystem::path& model_file);

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <sstream>
 #include <string_view>
@@ -21,14 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 using simulation::Effect;
 using simulation::Parameter;
-
-std::string read_text(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream || fs::is_directory(file)) throw InputError(fmt::format("cannot read {}", file.string()));
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
 
 std::vector<std::string> split_lines(const std::string& text) {
   std::vector<std::string> lines;
@@ -47,8 +38,8 @@ const Effect& known_effect(const std::string& name) {
 }
 
 /// First line (0-based) of the block of the effect, or -1.
-int effect_line(const fs::path& file, const std::string& name) {
-  const toml::table table = parse_toml(file);
+int effect_line(const ModelText& model, const std::string& name) {
+  const toml::table table = parse_toml(model.text, model.file);
   const toml::array* entries = table.get_as<toml::array>("effect");
   if (!entries) return -1;
   for (const toml::node& entry : *entries) {
@@ -129,20 +120,20 @@ std::string effect_block(const Effect& effect) {
   return block;
 }
 
-std::string with_effect(const fs::path& file, const std::string& name) {
+std::string with_effect(const ModelText& model, const std::string& name) {
   const Effect& effect = known_effect(name);
-  if (const int line = effect_line(file, name); line >= 0)
+  if (const int line = effect_line(model, name); line >= 0)
     throw InputError(fmt::format("{}:{}: the effect {} is there already; change its values, or remove it first",
-                                 file.string(), line + 1, name));
-  std::string text = read_text(file);
+                                 model.file.string(), line + 1, name));
+  std::string text = model.text;
   if (!text.empty() && text.back() != '\n') text += '\n';
   return text + effect_block(effect);
 }
 
-std::string without_effect(const fs::path& file, const std::string& name) {
-  const int line = effect_line(file, name);
-  if (line < 0) throw InputError(fmt::format("{} has no effect \"{}\" to remove", file.string(), name));
-  const std::vector<std::string> lines = split_lines(read_text(file));
+std::string without_effect(const ModelText& model, const std::string& name) {
+  const int line = effect_line(model, name);
+  if (line < 0) throw InputError(fmt::format("{} has no effect \"{}\" to remove", model.file.string(), name));
+  const std::vector<std::string> lines = split_lines(model.text);
   const auto begin = static_cast<std::size_t>(line);
   const std::size_t end = block_end(lines, begin);
   std::string text;
@@ -164,17 +155,16 @@ std::string written(double value) {
 
 }  // namespace
 
-std::string with_values(const fs::path& file, const std::map<std::string, double>& values) {
-  const toml::table table = parse_toml(file);
+std::string with_values(const ModelText& model, const std::map<std::string, double>& values) {
+  const toml::table table = parse_toml(model.text, model.file);
   std::vector<std::pair<toml::source_region, double>> places;
-  for (const auto& [name, value] : values) places.emplace_back(value_place(table, file, name), value);
+  for (const auto& [name, value] : values) places.emplace_back(value_place(table, model.file, name), value);
   // From the end of the file to its beginning, so that places further up stay where they are.
   std::sort(places.begin(), places.end(), [](const auto& a, const auto& b) {
     const auto &p = a.first.begin, &q = b.first.begin;
     return p.line != q.line ? p.line > q.line : p.column > q.column;
   });
-  const std::string text = read_text(file);
-  std::vector<std::string> lines = split_lines(text);
+  std::vector<std::string> lines = split_lines(model.text);
   for (const auto& [place, value] : places) {
     std::string& line = lines[place.begin.line - 1];
     const std::size_t begin = byte_of(line, place.begin.column), end = byte_of(line, place.end.column);

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <filesystem>
 #include <map>
 #include <string>
 
+#include "pipeline/case/model_file.h"
 #include "simulation/catalogue.h"
 
 namespace supine::pipeline {
@@ -14,19 +14,18 @@ namespace supine::pipeline {
 std::string effect_block(const simulation::Effect& effect);
 
 /// The text of a model.toml with the effect added at the end; everything else, comments too, stays byte for byte.
-/// @param file  what messages name; read for its present content
-/// @throws InputError  unknown effect, effect in the file already, file not readable or not TOML
-std::string with_effect(const std::filesystem::path& file, const std::string& name);
+/// @throws InputError  unknown effect, effect in the text already, no TOML
+std::string with_effect(const ModelText& model, const std::string& name);
 
 /// The text of a model.toml without the block of the effect: from its [[effect]] line to the next table. Comments
 /// that stand right above the next table belong to that and stay.
-/// @throws InputError  effect not in the file
-std::string without_effect(const std::filesystem::path& file, const std::string& name);
+/// @throws InputError  effect not in the text
+std::string without_effect(const ModelText& model, const std::string& name);
 
 /// The text of a model.toml with other values of parameters, fixed or free; everything else, comments too, stays byte
 /// for byte.
 /// @param values  by name (parameters.h), written with all their digits
-/// @throws InputError  a parameter whose number the file does not hold
-std::string with_values(const std::filesystem::path& file, const std::map<std::string, double>& values);
+/// @throws InputError  a parameter whose number the text does not hold
+std::string with_values(const ModelText& model, const std::map<std::string, double>& values);
 
 }  // namespace supine::pipeline

@@ -3,7 +3,9 @@
 
 #include <fmt/core.h>
 
+#include <fstream>
 #include <set>
+#include <sstream>
 
 #include "common/error.h"
 #include "common/suggestion.h"
@@ -214,9 +216,17 @@ diagnosis::Patchiness patchiness_of(const TomlReader& file) {
 
 }  // namespace
 
-simulation::Model read_model(const std::filesystem::path& path) {
-  const toml::table table = parse_toml(path);
-  const TomlReader file(table, path, "");
+ModelText read_model_text(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(file)) throw InputError(fmt::format("cannot read {}", file.string()));
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return {file, text.str()};
+}
+
+simulation::Model read_model(const ModelText& given) {
+  const toml::table table = parse_toml(given.text, given.file);
+  const TomlReader file(table, given.file, "");
   file.allow({"breast", "skin", "interface", "supports", "cut", "effect", "patchiness"});
   Model model;
   read_base(file, model);
@@ -226,9 +236,15 @@ simulation::Model read_model(const std::filesystem::path& path) {
   return model;
 }
 
-diagnosis::Patchiness read_patchiness(const std::filesystem::path& path) {
-  const toml::table table = parse_toml(path);
-  return patchiness_of(TomlReader(table, path, ""));
+simulation::Model read_model(const std::filesystem::path& file) { return read_model(read_model_text(file)); }
+
+diagnosis::Patchiness read_patchiness(const ModelText& given) {
+  const toml::table table = parse_toml(given.text, given.file);
+  return patchiness_of(TomlReader(table, given.file, ""));
+}
+
+diagnosis::Patchiness read_patchiness(const std::filesystem::path& file) {
+  return read_patchiness(read_model_text(file));
 }
 
 }  // namespace supine::pipeline

@@ -103,7 +103,8 @@ class ModelTool : public Tool {
     const std::string& effect = arguments_[0];
     const fs::path file = arguments_[1];
     const fs::path target = output.empty() ? file : output;
-    const std::string text = action_ == "add" ? with_effect(file, effect) : without_effect(file, effect);
+    const ModelText given = read_model_text(file);
+    const std::string text = action_ == "add" ? with_effect(given, effect) : without_effect(given, effect);
     // Changing the named file is what was asked for, so only another target needs --force.
     Outputs outputs(output.empty() || run.force());
     const fs::path temporary = outputs.stage(target);

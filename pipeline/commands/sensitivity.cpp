@@ -1,30 +1,24 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/work/sensitivity.h"
+
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 
-#include "calibration/evaluator_pool.h"
-#include "calibration/monte_carlo.h"
 #include "common/error.h"
 #include "common/statistics.h"
 #include "pipeline/case/journal_key.h"
 #include "pipeline/case/measured_case.h"
 #include "pipeline/case/population_priors.h"
 #include "pipeline/picture/picture.h"
-#include "pipeline/results/sensitivity_table.h"
 
 namespace supine::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using calibration::DrawKind;
 using calibration::FreeParameters;
-using calibration::RunResult;
 using Json = nlohmann::ordered_json;
-
-constexpr double quantiles[] = {0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975};
 
 class SensitivityTool : public Tool {
  public:
@@ -73,13 +67,7 @@ class SensitivityTool : public Tool {
     if (range.end > most_samples) throw InputError(fmt::format("--draws {}: at most {} draws", draws_, most_samples));
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
     const FreeParameters parameters(with_population(run, measured_->description, measured_->model));
-    const DrawKind kind = law_ == "normal" ? DrawKind::normal : DrawKind::prior;
-    const auto draws = calibration::draw_parameters(parameters, kind, static_cast<int>(range.end), seed_);
-    if (draws.refused > 0)
-      run.warn(
-          fmt::format("{} of {} draws lay outside the range of a parameter (with the normal law mostly negative "
-                      "moduli) and were refused; the sample is that of the law cut at the ranges",
-                      draws.refused, range.end + static_cast<std::size_t>(draws.refused)));
+    const auto draws = draw(run, parameters, law_, static_cast<int>(range.end), seed_);
     run.stage("runs");
     const SensitivityRows rows =
         parts_.empty() ? simulate(run, parameters, draws, range, target) : merge(parameters, draws);
@@ -106,19 +94,8 @@ class SensitivityTool : public Tool {
 
   SensitivityRows simulate(Run& run, const FreeParameters& parameters, const calibration::Draws& draws,
                            const DrawRange& range, const fs::path& target) const {
-    SensitivityRows rows{
-        range, {draws.values.begin() + static_cast<std::ptrdiff_t>(range.first), draws.values.end()}, {}};
-    calibration::RunJournal journal(fs::path(target).replace_extension(".runs"),
-                                    journal_key(*measured_, case_folder_, mesh_file_));
-    if (journal.known() > 0) run.say(fmt::format("  going on after {} chain runs", journal.known()));
-    calibration::EvaluatorPool pool(measured_->fitted_scene(), parameters, measured_->start, run.threads());
-    LiveProgress live(run);
-    std::size_t finished = journal.known();
-    int failed = 0;
-    rows.results = pool.run(rows.values, journal, [&](const RunResult& result) {
-      failed += result.failed;
-      live.show(fmt::format("run {} of {}, {} without equilibrium", ++finished, range.count(), failed));
-    });
+    calibration::RunJournal journal(fs::path(target).replace_extension(".runs"), depends_on());
+    SensitivityRows rows = run_draws(run, *measured_, parameters, draws, range, journal);
     run.no_longer_needed(journal.file());
     return rows;
   }
@@ -140,8 +117,8 @@ class SensitivityTool : public Tool {
   }
 
   void report_part(Run& run, const fs::path& target, const SensitivityRows& rows) const {
-    const auto failed =
-        std::count_if(rows.results.begin(), rows.results.end(), [](const RunResult& r) { return r.failed; });
+    const auto failed = std::count_if(rows.results.begin(), rows.results.end(),
+                                      [](const calibration::RunResult& r) { return r.failed; });
     Json& f = run.figures(target);
     f["draws"] = {rows.range.first, rows.range.end};
     f["law"] = law_;
@@ -153,29 +130,9 @@ class SensitivityTool : public Tool {
 
   void report(Run& run, const fs::path& target, const FreeParameters& parameters, const calibration::Draws& draws,
               const SensitivityRows& rows) const {
-    const auto& [values, mae] = solved_draws(rows, parameters.size());
+    run.figures(target) = sensitivity_figures(parameters, law_, draws, rows);
+    const std::vector<double> mae = solved_draws(rows, parameters.size()).mae_study_mm;
     const int failed = samples_ - static_cast<int>(mae.size());
-    if (mae.size() < 2)
-      throw NumericalFailure(
-          fmt::format("{} of {} draws had an equilibrium; narrow prior_sd or raise the moduli", mae.size(), samples_));
-    const Eigen::Map<const Eigen::VectorXd> m(mae.data(), static_cast<Eigen::Index>(mae.size()));
-    const double sd = std::sqrt((m.array() - m.mean()).square().sum() / static_cast<double>(m.size() - 1));
-    const Eigen::VectorXd shares = calibration::first_order_shares(values, m);
-    Json& f = run.figures(target);
-    f["samples"] = samples_;
-    f["law"] = law_;
-    f["refused_draws"] = draws.refused;
-    f["failed_solves"] = failed;
-    f["mae_study_mm"] = {{"mean", m.mean()}, {"sd", sd}, {"min", m.minCoeff()}, {"max", m.maxCoeff()}};
-    f["quantiles"] = Json::array();
-    for (const double q : quantiles) f["quantiles"].push_back({{"share", q}, {"mae_study_mm", quantile(mae, q)}});
-    f["parameters"] = Json::array();
-    for (Eigen::Index p = 0; p < parameters.size(); ++p)
-      f["parameters"].push_back({{"name", parameters.names()[static_cast<std::size_t>(p)]},
-                                 {"unit", parameters.unit(p)},
-                                 {"median", quantile({values.col(p).begin(), values.col(p).end()}, 0.5)},
-                                 {"variance_share", shares[p]}});
-    f["interaction_share"] = std::max(0.0, 1 - shares.sum());
     if (!png_.empty())
       draw_histogram(
           {fmt::format("{}: {} draws, {} without equilibrium", measured_->description.name, samples_, failed),
@@ -183,19 +140,21 @@ class SensitivityTool : public Tool {
            mae,
            {{"5 %", quantile(mae, 0.05)}, {"median", quantile(mae, 0.5)}, {"95 %", quantile(mae, 0.95)}}},
           run.output(png_));
-    say(run, parameters, mae, {m.mean(), sd}, shares, failed);
+    say(run, mae, run.figures(target));
   }
 
-  void say(const Run& run, const FreeParameters& parameters, const std::vector<double>& mae,
-           const std::pair<double, double>& mean_and_sd, const Eigen::VectorXd& shares, int failed) const {
-    run.say(fmt::format("  {} chain runs, {} without equilibrium", samples_, failed));
+  static void say(const Run& run, const std::vector<double>& mae, const Json& f) {
+    run.say(
+        fmt::format("  {} chain runs, {} without equilibrium", f["samples"].get<int>(), f["failed_solves"].get<int>()));
     run.say(fmt::format(
         "  MAE model to scan (study): {:.2f} ± {:.2f} mm (mean, sd); 5 % {:.2f}, median {:.2f}, 95 % {:.2f}",
-        mean_and_sd.first, mean_and_sd.second, quantile(mae, 0.05), quantile(mae, 0.5), quantile(mae, 0.95)));
-    for (Eigen::Index p = 0; p < shares.size(); ++p)
-      run.say(fmt::format("  {:>5.1f} % of the variance from {}", 100 * shares[p],
-                          parameters.names()[static_cast<std::size_t>(p)]));
-    run.say(fmt::format("  {:>5.1f} % from the parameters acting together", 100 * std::max(0.0, 1 - shares.sum())));
+        f["mae_study_mm"]["mean"].get<double>(), f["mae_study_mm"]["sd"].get<double>(), quantile(mae, 0.05),
+        quantile(mae, 0.5), quantile(mae, 0.95)));
+    for (const Json& parameter : f["parameters"])
+      run.say(fmt::format("  {:>5.1f} % of the variance from {}", 100 * parameter["variance_share"].get<double>(),
+                          parameter["name"].get<std::string>()));
+    run.say(
+        fmt::format("  {:>5.1f} % from the parameters acting together", 100 * f["interaction_share"].get<double>()));
   }
 
   fs::path case_folder_, mesh_file_, model_file_, png_;

@@ -127,7 +127,7 @@ class TargetsTool : public Tool {
     const std::vector<double> noise = measured->noise_mm(evaluator);
     diagnosis::BaseFitOptions options;
     options.priors = case_priors(measured->description, {});
-    options.priors.patchiness = read_patchiness(measured->model_file);
+    options.priors.patchiness = read_patchiness(measured->model_text);
     options.other_meshes = !no_other_meshes_;
     LiveProgress live(run, std::chrono::seconds(0));
     options.progress = [&live](const std::string& what) { live.show(what); };

@@ -156,6 +156,9 @@ Json calibration_figures(const MeasuredCase& measured, const FreeParameters& par
   if (!result.nuisances.empty()) f["nuisances"] = Json::array();
   for (const auto& n : result.nuisances) f["nuisances"].push_back({{"name", n.name}, {"value", n.value}, {"sd", n.sd}});
   f["remarks"] = calibration_remarks(parameters, result);
+  int profile_runs = 0;
+  for (const auto& [name, profile] : result.profiles) profile_runs += profile.runs;
+  f["profile_evaluations"] = profile_runs;
   return f;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -32,6 +33,7 @@ struct CalibrationResult {
     double value, sd;
   };
   std::vector<Nuisance> nuisances;
+  std::map<std::string, calibration::Profile> profiles;  ///< of intervals that are profiles, by parameter
 };
 
 /// Keys as in docs/calibration.md.

@@ -3,12 +3,10 @@
 
 #include <fmt/core.h>
 
-#include <fstream>
+#include <map>
 
 #include "calibration/free_parameters.h"
-#include "common/error.h"
 #include "pipeline/case/model_edit.h"
-#include "pipeline/case/model_file.h"
 
 namespace supine::pipeline {
 namespace {
@@ -40,12 +38,6 @@ std::map<std::string, double> fitted_values(const simulation::Model& model) {
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
     values[parameters.names()[static_cast<std::size_t>(i)]] = parameters.value(i, parameters.start()[i]);
   return values;
-}
-
-void replace(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << text;
-  if (!stream) throw InputError(fmt::format("cannot write {}", file.string()));
 }
 
 }  // namespace
@@ -80,13 +72,11 @@ void say_ladder(const Run& run, const diagnosis::Ladder& ladder) {
   run.say(fmt::format("  noise and mesh alone would leave {:.2f}; stopped: {}", ladder.noise_floor_mm, ladder.stopped));
 }
 
-void write_rung_model(const diagnosis::Ladder& ladder, std::size_t rung, const std::filesystem::path& read_from,
-                      const std::filesystem::path& file) {
-  std::filesystem::copy_file(read_from, file, std::filesystem::copy_options::overwrite_existing);
-  const simulation::Model& model = ladder.rungs[rung].model;
-  for (std::size_t r = 1; r <= rung; ++r) replace(file, with_effect(file, ladder.rungs[r].added));
-  replace(file, with_values(file, fitted_values(model)));
-  read_model(file);
+ModelText rung_model(const diagnosis::Ladder& ladder, std::size_t rung, ModelText given) {
+  for (std::size_t r = 1; r <= rung; ++r) given.text = with_effect(given, ladder.rungs[r].added);
+  given.text = with_values(given, fitted_values(ladder.rungs[rung].model));
+  read_model(given);
+  return given;
 }
 
 }  // namespace supine::pipeline

@@ -45,6 +45,7 @@ struct Run::State {
   Clock::time_point last_line = started;
   bool progress_shown = false;
   std::vector<fs::path> no_longer_needed;
+  std::function<void(Said, const std::string&)> listener;
 
   explicit State(bool force_outputs) : force(force_outputs), outputs(force_outputs) {}
 
@@ -99,6 +100,10 @@ Run::~Run() {
   if (state_) state_->clear_progress();
 }
 
+void Run::listen(std::function<void(Said, const std::string&)> listener) { state_->listener = std::move(listener); }
+
+bool Run::has_listener() const { return static_cast<bool>(state_->listener); }
+
 bool Run::force() const { return state_->force; }
 
 const fs::path& Run::input(const fs::path& file) {
@@ -126,6 +131,7 @@ fs::path Run::bare_output(const fs::path& target) { return state_->outputs.stage
 Json& Run::figures(const fs::path& output) { return state_->sidecar_of(output).figures; }
 
 void Run::say(std::string_view line) const {
+  if (state_->listener) return state_->listener(Said::line, std::string(line));
   if (state_->quiet || state_->json) return;
   state_->clear_progress();
   fmt::print("{}\n", line);
@@ -133,12 +139,17 @@ void Run::say(std::string_view line) const {
 }
 
 void Run::warn(const std::string& line) {
+  if (state_->listener) {
+    state_->warnings.push_back(line);
+    return state_->listener(Said::warning, line);
+  }
   state_->clear_progress();
   fmt::print(stderr, "{}: warning: {}\n", state_->tool, line);
   state_->warnings.push_back(line);
 }
 
 void Run::progress(std::string_view line) const {
+  if (state_->listener) return state_->listener(Said::progress, std::string(line));
   if (state_->quiet) return;
   if (isatty(STDERR_FILENO) == 0) {  // a file or a pipe: a line now and then, so that long work is never silent
     const auto now = Clock::now();

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/tool/runtime_settings.h"
 
+#include <omp.h>
 #include <unistd.h>
 
+#include <Eigen/Core>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
 
+#include "pipeline/tool/blas_kernels.h"
+
 extern "C" char* openblas_get_corename(void);
+extern "C" void openblas_set_num_threads(int threads);
 
 namespace supine::pipeline {
 namespace {
@@ -19,16 +24,8 @@ bool set_if_unset(const char* variable, const char* value) {
 }
 
 bool choose_blas_kernels() {
-#if defined(__x86_64__)
-  const std::string chosen = openblas_get_corename();
-  if (chosen != "Prescott" && chosen != "Core2" && chosen != "Generic" && chosen != "Nehalem") return false;
-  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma")) return false;
-  const bool wide = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
-                    __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
-  return set_if_unset("OPENBLAS_CORETYPE", wide ? "SkylakeX" : "Haswell");
-#else
-  return false;
-#endif
+  const std::string fitting = fitting_blas_kernels(openblas_get_corename());
+  return !fitting.empty() && set_if_unset("OPENBLAS_CORETYPE", fitting.c_str());
 }
 
 bool shorten_spinning() {
@@ -37,6 +34,15 @@ bool shorten_spinning() {
 }
 
 }  // namespace
+
+/// Parallelism is that of our own loops; BLAS on one thread keeps results identical for any thread count.
+int use_threads(int wanted) {
+  const int threads = wanted > 0 ? wanted : omp_get_max_threads();
+  omp_set_num_threads(threads);
+  Eigen::setNbThreads(1);  // its products would be cut, and rounded, by the number of threads
+  openblas_set_num_threads(1);
+  return threads;
+}
 
 void use_fitting_settings(char** argv) {
   const bool blas = choose_blas_kernels(), spinning = shorten_spinning();

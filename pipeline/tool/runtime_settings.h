@@ -13,4 +13,7 @@ namespace supine::pipeline {
 /// machine then hold each other up, measured: more than ten times. A thousand turns (microseconds) cost nothing alone.
 void use_fitting_settings(char** argv);
 
+/// Has the loops of the libraries run on that many threads, 0 = all, and BLAS on one. @return  the number
+int use_threads(int wanted);
+
 }  // namespace supine::pipeline

@@ -2,9 +2,7 @@
 #include "pipeline/tool/tool.h"
 
 #include <fmt/core.h>
-#include <omp.h>
 
-#include <Eigen/Core>
 #include <charconv>
 #include <cmath>
 #include <csignal>
@@ -18,8 +16,6 @@
 #include "common/error.h"
 #include "pipeline/tool/provenance.h"
 #include "pipeline/tool/runtime_settings.h"
-
-extern "C" void openblas_set_num_threads(int threads);
 
 namespace supine::pipeline {
 namespace {
@@ -40,15 +36,6 @@ void declare_common(CLI::App& app, Tool& tool, CommonOptions& common) {
   app.add_flag("--json", common.json, "print the figures as JSON on standard output instead of the table");
   app.add_flag("--force", common.force, "replace output files that exist");
   app.add_flag("--quiet", common.quiet, "print warnings and errors only");
-}
-
-/// Parallelism is that of our own loops; BLAS on one thread keeps results identical for any thread count.
-int use_threads(int wanted) {
-  const int threads = wanted > 0 ? wanted : omp_get_max_threads();
-  omp_set_num_threads(threads);
-  Eigen::setNbThreads(1);  // its products would be cut, and rounded, by the number of threads
-  openblas_set_num_threads(1);
-  return threads;
 }
 
 void say_options(const Run& run, const Tool& tool, const nlohmann::ordered_json& options) {

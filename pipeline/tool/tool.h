@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -15,10 +16,18 @@ namespace supine::pipeline {
 /// What a finished tool says to the shell. (2 bad input and 3 numerical failure come from exceptions.)
 enum class Outcome { done = 0, target_not_met = 1 };
 
+/// The kinds of lines a run says.
+enum class Said { line, warning, progress };
+
 /// One run of a tool: its common options, its inputs and outputs, its report.
 class Run {
  public:
   Run(std::string tool, bool force, bool quiet, bool json, int threads, nlohmann::ordered_json options);
+
+  /// Gives @p listener every line of the run, in place of standard output and standard error. Threads may call it, one
+  /// at a time; what it throws ends the run.
+  void listen(std::function<void(Said, const std::string& line)> listener);
+  bool has_listener() const;
 
   int threads() const { return threads_; }
   /// Whether existing files may be replaced.

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "calibration/uncertainty.h"
 #include "common/error.h"
 #include "simulation/parameters.h"
 #include "tests/calibration/twin.h"
@@ -221,6 +222,60 @@ TEST(LeastSquares, SaysThatNoPointOfTheScanLiesOverTheSkin) {
     EXPECT_NE(std::string(error.what()).find("no point of a scan lies over the skin"), std::string::npos)
         << error.what();
   }
+}
+
+/// How far a node of the first pose is from where it was seen along y, over sigma.
+class SeenHeight : public OwnResidual {
+ public:
+  SeenHeight(Eigen::Index node, double y_mm, double sigma_mm) : node_(node), y_mm_(y_mm), sigma_mm_(sigma_mm) {}
+  std::string name() const override { return "seen height"; }
+  Eigen::VectorXd value(const simulation::ChainSolution& shapes) const override {
+    const Eigen::Index rows = ++calls_ > rows_change_at_ ? 2 : 1;
+    return Eigen::VectorXd::Constant(rows, (shapes.poses[0].x(node_, 1) - y_mm_) / sigma_mm_);
+  }
+  Eigen::VectorXd change(const simulation::ChainSolution&, const simulation::ChainDerivative& move) const override {
+    return Eigen::VectorXd::Constant(1, move.poses[0](node_, 1) / sigma_mm_);
+  }
+  int rows_change_at_ = 1000;
+
+ private:
+  Eigen::Index node_;
+  double y_mm_, sigma_mm_;
+  mutable int calls_ = 0;
+};
+
+Fit fit_with(const OwnResidual* own) {
+  const FreeParameters parameters(twin_start());
+  Evaluator evaluator(exact_twin().scene(), twin_start());
+  FitOptions options;
+  options.noise_mm = {0.7};
+  if (own != nullptr) options.own = {own};
+  return fit_least_squares(evaluator, parameters, options);
+}
+
+TEST(LeastSquares, AResidualOfOnesOwnCountsAsItsSigmaSays) {
+  const Fit plain = fit_with(nullptr);
+  const simulation::ChainSolution& shapes = plain.prediction.solution;
+  Eigen::Index node = 0;
+  (shapes.poses[0].x - shapes.prone).rowwise().norm().maxCoeff(&node);
+  const double y = shapes.poses[0].x(node, 1);
+  const SeenHeight loose(node, y + 1, 1e6), tight(node, y + 1, 0.001);
+  EXPECT_LT((fit_with(&loose).u - plain.u).norm(), 1e-3);
+  const Fit pulled = fit_with(&tight);
+  EXPECT_NEAR(pulled.prediction.solution.poses[0].x(node, 1), y + 1, 0.2);
+  // What it says of the parameters goes into their covariance.
+  const FreeParameters parameters(twin_start());
+  EXPECT_EQ(plain.own_information.size(), 0);
+  Fit without = pulled;
+  without.own_information.resize(0, 0);
+  EXPECT_LT(judge(pulled, parameters, true).covariance.determinant(),
+            0.5 * judge(without, parameters, true).covariance.determinant());
+}
+
+TEST(LeastSquares, AResidualWhoseRowsChangeInNumberIsRefused) {
+  SeenHeight wrong(0, 0, 1);
+  wrong.rows_change_at_ = 1;
+  EXPECT_THROW(fit_with(&wrong), InputError);
 }
 
 }  // namespace

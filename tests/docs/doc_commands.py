@@ -151,7 +151,7 @@ def check_links(page):
 
 # A path names a file of a room by its end, as in `voxels.h`, or from the top of the source or from the page's folder.
 PATH = re.compile(r"(?:[\w.-]+/)*[\w.-]+\.(?:h|cpp|py|sh|awk|cmake|mjs|md)|(?:[\w.-]+/)+[\w.-]*|Makefile")
-ROOMS = ("bench", "calibration", "common", "diagnosis", "docs", "meshing", "phantom", "pipeline", "reconstruction", "registration",
+ROOMS = ("bench", "calibration", "common", "diagnosis", "docs", "meshing", "phantom", "pipeline", "python", "reconstruction", "registration",
          "samples",
          "segmentation", "simulation", "tests", "warp")
 # Made by a run or by the reader, or the reader's own names.

@@ -71,8 +71,8 @@ void read_model_file(const fs::path& folder) {
   const fs::path file = folder / "model.toml";
   pipeline::read_model(file);
   pipeline::read_patchiness(file);
-  pipeline::with_effect(file, "creep");
-  pipeline::without_effect(file, "ligament");
+  pipeline::with_effect(pipeline::read_model_text(file), "creep");
+  pipeline::without_effect(pipeline::read_model_text(file), "ligament");
 }
 
 void read_population(const fs::path& folder) {

@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: AGPL-3.0-or-later
 # Installs the Debian packages in a bare Debian 12 root and uses them there: package_test.sh PACKAGES WORK
-# The sample goes from its MRI to the report, samples/own_effect is built and run. Needs root, debootstrap and a registry.
+# The sample goes from its MRI to the report, Python predicts it to the same bytes, samples/own_effect is built and run. Needs root, debootstrap and a registry.
 # DEV=no leaves out supine-dev and own_effect. A root from an earlier call is used again.
 set -euo pipefail
 packages=$(realpath "$1") work=$(realpath -m "$2") mirror=${MIRROR:-http://deb.debian.org/debian}
@@ -42,6 +42,15 @@ grep -q view3d "$root/root/mycase/out/report.html" && say "report: $(stat -c %s 
 jq -r '"RMS \(.rms_mm) mm after calibration"' "$root/root/mycase/out/calibration.json"
 inside mkdir -p /root/cohort && inside cp -r /root/mycase /root/cohort/
 inside supine COHORT=/root/cohort TARGET=calibrate THREADS=2 | tail -n 1
+
+say "install python3-supine"
+inside sh -c 'apt-get install -y -qq --no-install-recommends /packages/python3-supine_*.deb' >"$work/install-python.log" 2>&1 || { tail "$work/install-python.log"; exit 1; }
+inside python3 -c '
+import supine
+case = supine.Case("/root/mycase")
+mesh = supine.Mesh("/root/mycase/out/mesh.vtu", case)
+supine.simulate(case, mesh, supine.Model("/root/mycase/model.toml")).write("supine", "/root/python.vtu", force=True)'
+cmp "$root/root/python.vtu" "$root/root/mycase/out/supine.vtu" && say "Python predicts the bytes of the tools"
 
 [ "${DEV:-yes}" = yes ] || exit 0
 say "install supine-dev"

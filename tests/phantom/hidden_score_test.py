@@ -114,6 +114,16 @@ class Scored(unittest.TestCase):
         again = hidden_score.scored_before([self.root / "first.jsonl", self.root / "second.jsonl"])
         self.assertEqual(hidden_score.text_of(again), hidden_score.text_of(self.cases))
 
+    def test_parts_of_machines_give_the_bytes_of_one(self):
+        rows = [json.dumps(case) + "\n" for case in self.cases]
+        (self.root / "one.jsonl").write_text("".join(rows))
+        (self.root / "a.jsonl").write_text("".join(rows[:0:-2]))  # in the order in which cases end, not that of numbers
+        (self.root / "b.jsonl").write_text("".join(row for row in rows if row not in rows[:0:-2]))
+        for name, parts in (("whole", ["one"]), ("merged", ["b", "a"])):
+            hidden_score.write(hidden_score.scored_before([self.root / f"{part}.jsonl" for part in parts]), self.root / name)
+        for end in ("md", "csv", "json", "jsonl"):
+            self.assertEqual((self.root / f"merged.{end}").read_bytes(), (self.root / f"whole.{end}").read_bytes(), end)
+
     def test_unknown_verdict_is_refused(self):
         (self.root / "out" / "case-000" / "diagnosis.json").write_text('{"verdict": "perhaps", "missing": []}')
         with self.assertRaisesRegex(SystemExit, "perhaps"):

@@ -106,6 +106,41 @@ TEST_F(Calibrate, GivesTheSameBytesForAnyNumberOfThreads) {
   EXPECT_EQ(without_timing("one/calibration.json"), without_timing("two/calibration.json"));
 }
 
+TEST_F(Calibrate, ProfilesInPartsGiveTheBytesOfOneRun) {
+  const std::vector<std::string> profile = {"--intervals", "profile"};
+  const auto with = [&profile](std::vector<std::string> more) {
+    more.insert(more.end(), profile.begin(), profile.end());
+    return more;
+  };
+  ASSERT_LE(run("calibrate", "whole", profile).code, 1);
+  ASSERT_LE(run("calibrate", "skin", with({"--profile-of", "skin.young_modulus_kpa"})).code, 1);
+  ASSERT_LE(run("calibrate", "breast", with({"--profile-of", "breast.young_modulus_kpa"})).code, 1);
+  EXPECT_FALSE(fs::exists(folder() / "skin/model.toml"));
+  const std::string skin = (folder() / "skin/profiles.csv").string(),
+                    breast = (folder() / "breast/profiles.csv").string();
+  ASSERT_LE(run("calibrate", "merged", with({"--merge", skin, breast})).code, 1);
+  for (const char* file : {"model.toml", "history.csv"})
+    EXPECT_EQ(bytes(fs::path("merged") / file), bytes(fs::path("whole") / file));
+  EXPECT_EQ(without_timing("merged/calibration.json"), without_timing("whole/calibration.json"));
+  EXPECT_GT(json("whole/calibration.json")["profile_evaluations"].get<int>(), 3);
+
+  const auto refused = [&](std::vector<std::string> words, const std::string& message) {
+    const Finished finished = run("calibrate", "none", std::move(words));
+    EXPECT_EQ(finished.code, 2);
+    EXPECT_NE(finished.err.find(message), std::string::npos) << finished.err;
+    EXPECT_FALSE(fs::exists(folder() / "none"));
+  };
+  refused(with({"--merge", skin}), "breast.young_modulus_kpa is in no part; make it with --profile-of");
+  refused(with({"--merge", skin, skin, breast}), "skin.young_modulus_kpa is in another part too");
+  refused(with({"--robust", "3", "--merge", skin, breast}), "was not made by this program from this case");
+  refused({"--merge", skin, breast}, "--merge goes with --intervals profile");
+  refused(with({"--profile-of", "skin.young_modulus"}),
+          "--profile-of skin.young_modulus: the model has no such free number");
+  refused({"--profile-of", "skin.young_modulus_kpa"}, "--profile-of goes with --intervals profile");
+  write_text(folder() / "skin/profiles.csv", "parameter,low,high,runs\nskin.young_modulus_kpa,1,2\n");
+  refused(with({"--merge", skin, breast}), "profiles.csv:2: must be a row of parameter,low,high,runs");
+}
+
 TEST_F(Calibrate, LeavesOutPointsThatStandOutAndSaysSo) {
   ASSERT_LE(run("calibrate", "as_it_is").code, 1);
   EXPECT_EQ(json("as_it_is/calibration.json")["warnings"].dump().find("stand out"), std::string::npos);

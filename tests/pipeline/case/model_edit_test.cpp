@@ -21,24 +21,24 @@ class ModelEdit : public testing::Test {
 };
 
 TEST_F(ModelEdit, AddingKeepsEveryByteBefore) {
-  const std::string text = with_effect(file(base), "ligament");
+  const std::string text = with_effect(read_model_text(file(base)), "ligament");
   EXPECT_EQ(text.substr(0, base.size()), base);
 }
 
 TEST_F(ModelEdit, EveryEffectOfTheCatalogueCanBeAddedReadAndRemoved) {
   for (const simulation::Effect* effect : simulation::catalogue()) {
-    const auto path = file(with_effect(file(base), effect->name()));
+    const auto path = file(with_effect(read_model_text(file(base)), effect->name()));
     const simulation::Model model = read_model(path);
     ASSERT_EQ(model.effects.size(), 1u) << effect->name();
     bool any_free = false;
     for (const auto& [key, setting] : model.effects[0].parameters) any_free |= setting.free;
     EXPECT_TRUE(any_free) << effect->name();
-    EXPECT_EQ(without_effect(path, effect->name()), base) << effect->name();
+    EXPECT_EQ(without_effect(read_model_text(path), effect->name()), base) << effect->name();
   }
 }
 
 TEST_F(ModelEdit, StrengthAndPlaceOfAnAddedEffectAreFreeAboutTheirUsualValues) {
-  const simulation::Model model = read_model(file(with_effect(file(base), "ligament")));
+  const simulation::Model model = read_model(file(with_effect(read_model_text(file(base)), "ligament")));
   for (const simulation::Parameter& row : simulation::find_effect("ligament")->parameters()) {
     const simulation::Setting& setting = model.effects[0].parameters.at(row.name);
     EXPECT_TRUE(setting.free) << row.name;
@@ -52,20 +52,22 @@ TEST_F(ModelEdit, StrengthAndPlaceOfAnAddedEffectAreFreeAboutTheirUsualValues) {
 TEST_F(ModelEdit, RemovingKeepsTheCommentOfTheNextTable) {
   const auto path =
       file("[[effect]]\nname = \"ligament\"\nwidth_mm = 10\n\n# about the skin\n[skin]\nthickness_mm = 2\n");
-  EXPECT_EQ(without_effect(path, "ligament"), "\n# about the skin\n[skin]\nthickness_mm = 2\n");
+  EXPECT_EQ(without_effect(read_model_text(path), "ligament"), "\n# about the skin\n[skin]\nthickness_mm = 2\n");
 }
 
 TEST_F(ModelEdit, AddingTwiceIsRefusedWithTheLine) {
-  const auto path = file(with_effect(file(base), "ligament"));
-  expect_words(input_error([&] { with_effect(path, "ligament"); }), {"model.toml:4", "already"});
+  const auto path = file(with_effect(read_model_text(file(base)), "ligament"));
+  expect_words(input_error([&] { with_effect(read_model_text(path), "ligament"); }), {"model.toml:4", "already"});
 }
 
 TEST_F(ModelEdit, AMisspeltEffectIsRefusedWithTheNearestName) {
-  expect_words(input_error([&] { with_effect(file(base), "ligamnet"); }), {"ligamnet", "did you mean ligament?"});
+  expect_words(input_error([&] { with_effect(read_model_text(file(base)), "ligamnet"); }),
+               {"ligamnet", "did you mean ligament?"});
 }
 
 TEST_F(ModelEdit, RemovingWhatIsNotThereIsRefused) {
-  expect_words(input_error([&] { without_effect(file(base), "ligament"); }), {"model.toml", "ligament"});
+  expect_words(input_error([&] { without_effect(read_model_text(file(base)), "ligament"); }),
+               {"model.toml", "ligament"});
 }
 
 TEST_F(ModelEdit, NewValuesKeepEverythingElse) {
@@ -74,9 +76,9 @@ TEST_F(ModelEdit, NewValuesKeepEverythingElse) {
       "[skin.young_modulus_kpa]\nvalue = 20  # soft\n[[effect]]\nname = \"ligament\"\n"
       "stiffness_kpa_per_mm = { lower = 0, value = 0.4 }\n";
   const auto path = file(text);
-  const std::string edited = with_values(path, {{"breast.young_modulus_kpa", 1.0 / 3},
-                                                {"skin.young_modulus_kpa", 33.25},
-                                                {"ligament.stiffness_kpa_per_mm", 0.125}});
+  const std::string edited = with_values(read_model_text(path), {{"breast.young_modulus_kpa", 1.0 / 3},
+                                                                 {"skin.young_modulus_kpa", 33.25},
+                                                                 {"ligament.stiffness_kpa_per_mm", 0.125}});
   std::string expected = text;
   expected.replace(expected.find("value = 0.5"), 11, "value = 0.3333333333333333");
   expected.replace(expected.find("value = 20"), 10, "value = 33.25");
@@ -90,18 +92,19 @@ TEST_F(ModelEdit, NewValuesKeepEverythingElse) {
 TEST_F(ModelEdit, AValueThatRoundingPutBesideItsBoundIsTheBound) {
   const auto path = file("[breast]\nyoung_modulus_kpa = { value = 500, prior_sd = 400, lower = 50, upper = 5000 }\n");
   const double fitted = std::nextafter(50.0, 0.0);
-  EXPECT_EQ(read_model(file(with_values(path, {{"breast.young_modulus_kpa", fitted}}))).breast.young_modulus_kpa.value,
+  EXPECT_EQ(read_model(file(with_values(read_model_text(path), {{"breast.young_modulus_kpa", fitted}})))
+                .breast.young_modulus_kpa.value,
             50);
 }
 
 TEST_F(ModelEdit, AFixedNumberIsReplacedToo) {
-  EXPECT_EQ(with_values(file(base), {{"breast.young_modulus_kpa", 0.25}}),
+  EXPECT_EQ(with_values(read_model_text(file(base)), {{"breast.young_modulus_kpa", 0.25}}),
             "# my notes\n[breast]\nyoung_modulus_kpa = 0.25  # from the clinic\n");
 }
 
 TEST_F(ModelEdit, NewValuesAreForNumbersThatStandInTheFile) {
-  EXPECT_THROW(with_values(file(base), {{"skin.young_modulus_kpa", 1}}), InputError);
-  EXPECT_THROW(with_values(file(base), {{"ligament.stiffness_kpa_per_mm", 1}}), InputError);
+  EXPECT_THROW(with_values(read_model_text(file(base)), {{"skin.young_modulus_kpa", 1}}), InputError);
+  EXPECT_THROW(with_values(read_model_text(file(base)), {{"ligament.stiffness_kpa_per_mm", 1}}), InputError);
 }
 
 }  // namespace

@@ -221,5 +221,20 @@ TEST_F(ToolMain, ChecksOfNumbersSayWhatIsWanted) {
   EXPECT_EQ(said(not_below_zero(), "1,5"), "1,5 is no number from 0 up");
 }
 
+TEST(RunOfATool, GivesItsListenerEveryLineAndPrintsNone) {
+  pipeline::Run run("supine-test", false, true, false, 1, nlohmann::ordered_json::object());
+  std::vector<std::pair<Said, std::string>> heard;
+  run.listen([&heard](Said kind, const std::string& line) { heard.emplace_back(kind, line); });
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  run.say("a line");
+  run.warn("careful");
+  run.progress("half way");
+  EXPECT_EQ(::testing::internal::GetCapturedStdout() + ::testing::internal::GetCapturedStderr(), "");
+  const std::vector<std::pair<Said, std::string>> expected = {
+      {Said::line, "a line"}, {Said::warning, "careful"}, {Said::progress, "half way"}};
+  EXPECT_EQ(heard, expected);
+}
+
 }  // namespace
 }  // namespace supine::pipeline

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/work/calibrate.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "calibration/cmaes.h"
+#include "calibration/held_out.h"
+#include "common/error.h"
+#include "common/suggestion.h"
+#include "diagnosis/evidence/base_fit.h"
+#include "diagnosis/weighted_fit.h"
+#include "pipeline/case/case_priors.h"
+#include "pipeline/case/model_edit.h"
+#include "pipeline/case/population_priors.h"
+#include "simulation/catalogue.h"
+#include "simulation/parameters.h"
+
+namespace supine::pipeline {
+namespace {
+
+using calibration::Evaluator;
+using calibration::Fit;
+using calibration::FreeParameters;
+
+/// The fit as the statistics of surfaces take it: without landmarks.
+Fit skin_of(Fit fit) {
+  fit.linearisation.slope.conservativeResize(fit.residuals.skin_rows(), Eigen::NoChange);
+  fit.residuals = fit.residuals.skin();
+  return fit;
+}
+
+/// The scan's place as six more unknowns, with the catalogue's priors.
+void add_scan_offset(simulation::Model& model) {
+  for (const auto& effect : model.effects)
+    if (simulation::traits_of(effect.name).moves_scan) return;
+  const simulation::Effect& effect = simulation::place_of_scan();
+  simulation::EffectSetting setting = simulation::null_setting(effect);
+  for (const simulation::Parameter& row : effect.parameters())
+    setting.parameters[row.name] = {row.null, true, row.spread, row.lower, row.upper};
+  model.effects.push_back(setting);
+}
+
+class Calibration {
+ public:
+  Calibration(Run& run, const MeasuredCase& measured, const FreeParameters& parameters, const CalibrateOptions& asked,
+              calibration::RunJournal& journal)
+      : run_(run), measured_(measured), parameters_(parameters), asked_(asked), journal_(journal), live_(run) {}
+
+  CalibrationResult run() {
+    Evaluator evaluator(measured_.fitted_scene(), parameters_.base());
+    const calibration::FitOptions options = fit_options(evaluator);
+    CalibrationResult result;
+    result.method = asked_.method;
+    result.noise_mm = options.noise_mm;
+    run_.stage("fit");
+    Eigen::MatrixXd posterior;
+    if (asked_.method == "joint")
+      posterior = fit_jointly(options, result);
+    else
+      result.fit = asked_.method == "cmaes" ? search_cmaes(evaluator, options)
+                                            : calibration::fit_least_squares(evaluator, parameters_, options);
+    run_.stage("worth");
+    result.uncertainty = calibration::judge(skin_of(result.fit), parameters_, options.use_priors);
+    if (asked_.method == "joint") result.uncertainty.covariance = posterior;
+    result.interval_kind = asked_.method == "joint" ? "posterior" : asked_.intervals;
+    if (asked_.method == "cmaes") result.interval_kind = "linear";  // another optimum than that of the profiled cost
+    result.intervals = calibration::linear_intervals(result.fit, parameters_, result.uncertainty);
+    if (result.interval_kind == "profile") find_profiles(evaluator, options, result);
+    hold_out(options, result);
+    return result;
+  }
+
+ private:
+  void find_profiles(Evaluator& evaluator, const calibration::FitOptions& options, CalibrationResult& result) const {
+    const auto wanted = [this](const std::string& name) {
+      return asked_.profile_of.empty() || std::count(asked_.profile_of.begin(), asked_.profile_of.end(), name) > 0;
+    };
+    for (Eigen::Index i = 0; i < parameters_.size(); ++i) {
+      const std::string& name = parameters_.names()[static_cast<std::size_t>(i)];
+      const auto known = asked_.known_profiles.find(name);
+      if (known == asked_.known_profiles.end() && !wanted(name)) continue;
+      const calibration::Profile profile =
+          known != asked_.known_profiles.end()
+              ? known->second
+              : calibration::profile_interval(evaluator, parameters_, options, result.fit, result.uncertainty, i);
+      result.profiles[name] = profile;
+      result.intervals[static_cast<std::size_t>(i)] = profile.interval;
+    }
+  }
+
+  calibration::FitOptions fit_options(Evaluator& evaluator) {
+    calibration::FitOptions options;
+    options.robust_mm = asked_.robust_mm;
+    options.use_priors = asked_.use_priors;
+    options.starts = asked_.starts;
+    options.seed = asked_.seed;
+    options.noise_mm = measured_.noise_mm(evaluator);
+    options.near = &measured_.start;
+    options.own = asked_.own;
+    options.progress = [this](const calibration::FitProgress& p) {
+      live_.show(fmt::format("run {}: RMS {:.3f} mm, best {:.3f} mm, {} without equilibrium{}", p.evaluations, p.rms_mm,
+                             p.best_rms_mm, p.failed, p.outside_tissue ? "; at moduli that no tissue has" : ""));
+    };
+    for (std::size_t m = 0; m < options.noise_mm.size(); ++m)
+      if (!measured_.fitted[m].noise_mm)
+        run_.say(fmt::format("  noise of {} not given, estimated: {:.2f} mm", measured_.fitted[m].pose.name,
+                             options.noise_mm[m]));
+    return options;
+  }
+
+  /// Moduli together with all that is never known. @return  covariance of the coordinates, over all else
+  Eigen::MatrixXd fit_jointly(const calibration::FitOptions& options, CalibrationResult& result) {
+    diagnosis::BaseFitOptions joint;
+    joint.priors = case_priors(measured_.description, {});
+    joint.priors.patchiness = read_patchiness(measured_.model_text);
+    joint.progress = [this](const std::string& what) { live_.show(what); };
+    Evaluator evaluator(measured_.marked_scene(), parameters_.base(), diagnosis::accurate_enough());
+    diagnosis::BaseFit base =
+        diagnosis::fit_base_model(evaluator, parameters_.base(), measured_.begin_with(parameters_.base()),
+                                  options.noise_mm, &measured_.start, joint);
+    const diagnosis::JointPosterior posterior = diagnosis::posterior_of(base);
+    for (Eigen::Index k = parameters_.size(); k < posterior.value.size(); ++k)
+      result.nuisances.push_back({posterior.names[static_cast<std::size_t>(k)], posterior.value[k], posterior.sd[k]});
+    result.fit = std::move(base.fit);
+    result.fit.evaluations = base.evaluations;
+    result.fit.converged = true;
+    result.fit.message = "joint fit with all that is never known";
+    return posterior.of_parameters;
+  }
+
+  Fit search_cmaes(Evaluator& evaluator, const calibration::FitOptions& fit_options) {
+    calibration::CmaesOptions options;
+    options.seed = asked_.seed;
+    options.population = asked_.population;
+    options.max_evaluations = asked_.max_evaluations;
+    options.until_mae_mm = asked_.until_mae_mm;
+    options.progress = [this](int evaluations, int failed, double best) {
+      live_.show(fmt::format("after {} runs: best MAE {:.3f} mm, {} without equilibrium", evaluations, best, failed));
+    };
+    if (journal_.known() > 0) run_.say(fmt::format("  going on after {} chain runs", journal_.known()));
+    calibration::EvaluatorPool pool(measured_.fitted_scene(), parameters_, measured_.start, run_.threads());
+    const calibration::CmaesResult found = calibration::minimise_cmaes(pool, parameters_, options, journal_);
+    Eigen::VectorXd u(parameters_.size());
+    for (Eigen::Index i = 0; i < u.size(); ++i) u[i] = parameters_.coordinate(i, found.values[i]);
+    Fit fit = calibration::evaluate_fit(evaluator, parameters_, fit_options, u);
+    fit.history = found.history;
+    fit.evaluations = found.evaluations, fit.failed = found.failed, fit.iterations = found.generations;
+    fit.message = found.message;
+    fit.converged = found.evaluations < asked_.max_evaluations || found.target_met;
+    return fit;
+  }
+
+  void hold_out(const calibration::FitOptions& options, CalibrationResult& result) const {
+    const Fit fit = skin_of(result.fit);
+    const auto& residuals = fit.residuals;
+    const auto as_list = [](const Eigen::VectorXd& d) { return std::vector<double>(d.begin(), d.end()); };
+    result.in_sample = calibration::figures_of(as_list(residuals.distance_mm));
+    Eigen::VectorXd priors = parameters_.prior_information();
+    if (!options.use_priors) priors.setZero();
+    result.held_out_blocks = calibration::figures_of(as_list(calibration::held_out_distances(
+        residuals, fit.linearisation.slope, priors, calibration::spatial_blocks(residuals))));
+    if (measured_.held_out.empty()) return;
+    calibration::MeasuredScene scene = measured_.fitted_scene();
+    scene.measurements.clear();
+    for (const calibration::Measurement& held_out : measured_.held_out) scene.measurements.push_back(&held_out);
+    const simulation::Model model = parameters_.model(result.fit.u);
+    Evaluator other(scene, model);
+    simulation::ChainSolution near = result.fit.prediction.solution;
+    near.poses.assign(measured_.start.poses.begin() + static_cast<std::ptrdiff_t>(measured_.fitted.size()),
+                      measured_.start.poses.end());
+    const calibration::Prediction prediction = other.predict(model, &near);
+    for (std::size_t m = 0; m < scene.measurements.size(); ++m) {
+      calibration::Prediction one;
+      one.poses.push_back(prediction.poses[m]);
+      result.held_out_poses.push_back(
+          {scene.measurements[m]->pose.name, one.mae_study_mm(), calibration::figures_of(one.scan_distances())});
+    }
+  }
+
+  Run& run_;
+  const MeasuredCase& measured_;
+  const FreeParameters& parameters_;
+  const CalibrateOptions& asked_;
+  calibration::RunJournal& journal_;
+  LiveProgress live_;
+};
+
+void check_range(const char* name, double value, double lower, double upper) {
+  if (!(value >= lower && value <= upper))
+    throw InputError(fmt::format("{} = {}: must be {} to {}", name, value, lower, upper));
+}
+
+void check_choice(const char* name, const std::string& value, const std::vector<std::string>& values) {
+  if (std::find(values.begin(), values.end(), value) == values.end())
+    throw InputError(fmt::format("{} = {}: must be {}", name, value, listed(values)));
+}
+
+}  // namespace
+
+void CalibrateOptions::check() const {
+  constexpr double any = std::numeric_limits<double>::max(), above_zero = std::numeric_limits<double>::min();
+  check_choice("method", method, {"least-squares", "joint", "cmaes"});
+  check_choice("intervals", intervals, {"linear", "profile"});
+  check_range("starts", starts, 1, 1000);
+  check_range("robust_mm", robust_mm, above_zero, any);
+  check_range("population", population, 0, 10000);
+  check_range("max_evaluations", max_evaluations, 1, any);
+  if (until_mae_mm) check_range("until_mae_mm", *until_mae_mm, 0, any);
+  if (!profile_of.empty() && (intervals != "profile" || method != "least-squares"))
+    throw InputError("--profile-of goes with --intervals profile and the method least-squares");
+  if (!own.empty() && method != "least-squares")
+    throw InputError(fmt::format("own residuals go with the method least-squares, not with {}", method));
+  if (!own.empty() && intervals == "profile")
+    throw InputError("own residuals go with linear intervals: profiles are of the distances alone");
+  if (method != "joint") return;
+  for (const auto& [given, option] :
+       {std::pair(!use_priors, "--no-priors"), std::pair(scan_offset, "--scan-offset"),
+        std::pair(intervals == "profile", "--intervals profile"), std::pair(starts > 1, "--starts")})
+    if (given)
+      throw InputError(
+          fmt::format("{} goes with another method than joint, which has priors, the scans' places and "
+                      "the intervals of its posterior in it; leave {} out, or take --method least-squares",
+                      option, option));
+}
+
+FreeParameters parameters_to_fit(Run& run, const MeasuredCase& measured, const CalibrateOptions& options) {
+  simulation::Model model = with_population(run, measured.description, measured.model);
+  if (options.scan_offset) add_scan_offset(model);
+  FreeParameters parameters(model);
+  parameters.begin_with(measured.begin_with(model));
+  for (const std::string& name : options.profile_of)
+    if (std::count(parameters.names().begin(), parameters.names().end(), name) == 0)
+      throw InputError(fmt::format("--profile-of {}: the model has no such free number; it has {}", name,
+                                   listed(parameters.names())));
+  return parameters;
+}
+
+CalibrationResult calibrate(Run& run, const MeasuredCase& measured, const FreeParameters& parameters,
+                            const CalibrateOptions& options, calibration::RunJournal& journal) {
+  return Calibration(run, measured, parameters, options, journal).run();
+}
+
+ModelText fitted_model(const MeasuredCase& measured, const FreeParameters& parameters,
+                       const CalibrationResult& result) {
+  ModelText fitted = measured.model_text;
+  if (parameters.base().effects.size() > measured.model.effects.size())
+    fitted.text = with_effect(fitted, simulation::place_of_scan().name());
+  std::map<std::string, double> values;
+  for (Eigen::Index i = 0; i < parameters.size(); ++i)
+    values[parameters.names()[static_cast<std::size_t>(i)]] = parameters.value(i, result.fit.u[i]);
+  fitted.text = with_values(fitted, values);
+  read_model(fitted);
+  return fitted;
+}
+
+Outcome judge(Run& run, const CalibrateOptions& options, const CalibrationResult& result) {
+  const double mae = result.fit.prediction.mae_study_mm();
+  if (options.until_mae_mm && !(mae <= *options.until_mae_mm)) {
+    run.warn(
+        fmt::format("the MAE model to scan is {:.3f} mm, above the {} mm of --until-mae", mae, *options.until_mae_mm));
+    return Outcome::target_not_met;
+  }
+  if (result.fit.converged) return Outcome::done;
+  run.warn(fmt::format("the fit stopped before it converged: {}", result.fit.message));
+  return Outcome::target_not_met;
+}
+
+}  // namespace supine::pipeline

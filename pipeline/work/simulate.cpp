@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "pipeline/work/simulate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/error.h"
+#include "common/rms.h"
+#include "common/suggestion.h"
+#include "meshing/mesh_io.h"
+#include "simulation/solve/linear_solver.h"
+#include "simulation/terms/bulk.h"
+
+namespace supine::pipeline {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using simulation::InverseMethod;
+using simulation::PoseSolution;
+
+// A round trip beyond this is not a certificate; the true inverse ends orders below.
+constexpr double round_trip_bound_mm = 1e-6;
+
+// Two balanced shapes closer than this are one for whoever reads the prediction.
+constexpr double second_shape_bound_mm = 0.01;
+
+InverseMethod inverse_method(const std::string& name) {
+  const auto found = inverse_methods().find(name);
+  if (found != inverse_methods().end()) return found->second;
+  std::vector<std::string> names;
+  for (const auto& [known, method] : inverse_methods()) names.push_back(known);
+  throw InputError(fmt::format("inverse = {}: must be one of {}", name, listed(names)));
+}
+
+Json figures_of(const CaseInputs& in, const Simulated& simulated, const simulation::SolveReport& report,
+                const Points& x) {
+  const simulation::ChainSolution& solution = simulated.solution;
+  const Eigen::VectorXd from_prone = (x - in.mesh.points).rowwise().norm();
+  const Eigen::VectorXd from_undeformed = (x - solution.X).rowwise().norm();
+  Json f;
+  f["inverse"] =
+      in.description.imaged_pose == simulation::free_of_load ? "none: imaged free of load" : simulated.inverse;
+  f["round_trip_max_mm"] = solution.round_trip_max_mm;
+  f["round_trip_rms_mm"] = solution.round_trip_rms_mm;
+  f["newton_iterations"] = report.newton_iterations;
+  f["factorisations"] = report.factorisations;
+  f["load_steps"] = report.load_steps;
+  f["min_det_f"] = report.min_det_f;
+  f["folded_cells"] = report.folded_cells;
+  f["residual_share"] = report.residual_share;
+  const double undeformed = simulation::volume_mm3(in.mesh.cells, solution.X);
+  const double volume = simulation::volume_mm3(in.mesh.cells, x);
+  f["volume_ml"] = 1e-3 * volume;
+  f["volume_change"] = volume / undeformed - 1;
+  f["displacement_from_prone_mm"] = {{"rms", rms(from_prone)}, {"max", from_prone.maxCoeff()}};
+  f["displacement_from_undeformed_mm"] = {{"rms", rms(from_undeformed)}, {"max", from_undeformed.maxCoeff()}};
+  const auto place = [&x](int point) -> Json {
+    if (point < 0) return nullptr;
+    return {x(point, 0), x(point, 1), x(point, 2)};
+  };
+  if (in.anatomy.breasts.empty() && !in.anatomy.is_object()) f["nipple_mm"] = place(in.anatomy.nipple_point);
+  for (const meshing::Anatomy& one : in.anatomy.breasts) f["nipple_mm"][one.side] = place(one.nipple_point);
+  f["load_number"] = simulation::load_number(in.anatomy, in.model);
+  f["nodes"] = in.mesh.points.rows();
+  f["tetrahedra"] = in.mesh.cells.rows();
+  f["order"] = in.mesh.order();
+  f["muscle_fit_rms_mm"] = in.anatomy.muscle->fit_rms_mm();
+  f["blas"] = simulation::blas_description();
+  return f;
+}
+
+}  // namespace
+
+const std::map<std::string, InverseMethod>& inverse_methods() {
+  static const std::map<std::string, InverseMethod> methods = {{"newton", InverseMethod::newton},
+                                                               {"fixed-point", InverseMethod::fixed_point},
+                                                               {"reversed-gravity", InverseMethod::reversed_gravity}};
+  return methods;
+}
+
+std::vector<simulation::PoseLoad> loads_of(const Case& description, const std::vector<std::string>& wanted) {
+  for (const std::string& name : wanted) description.pose(name);
+  std::vector<simulation::PoseLoad> loads;
+  for (const Pose& pose : description.poses)
+    if (pose.name == description.imaged_pose || wanted.empty() ||
+        std::find(wanted.begin(), wanted.end(), pose.name) != wanted.end())
+      loads.push_back({pose.name, pose.gravity});
+  return loads;
+}
+
+void warn_of_locking(Run& run, const CaseInputs& in) {
+  const auto poisson = Eigen::VectorXd::Constant(in.mesh.cells.rows(), in.model.breast.poisson_ratio.value);
+  const std::string warning = simulation::locking_warning(in.mesh.order(), poisson, in.model.breast.volumetric);
+  if (!warning.empty()) run.warn(warning);
+}
+
+simulation::SolveOptions solve_options(Run& run) {
+  simulation::SolveOptions options;
+  options.progress = [&run](const std::string& what, double load, int iteration, double share) {
+    run.progress(fmt::format("{}: load {:.0f} %, iteration {}, {:.1e} of the weight unbalanced", what, 100 * load,
+                             iteration, share));
+  };
+  return options;
+}
+
+Simulated simulate(Run& run, const CaseInputs& in, const SimulateOptions& asked) {
+  Simulated simulated{loads_of(in.description, asked.poses), asked.inverse, {}};
+  simulated.solution = simulation::solve_chain(in.mesh, in.anatomy, in.model, simulated.loads,
+                                               inverse_method(asked.inverse), solve_options(run));
+  for (const std::string& warning : simulated.solution.warnings) run.warn(warning);
+  return simulated;
+}
+
+Outcome judge(Run& run, const Simulated& simulated) {
+  const simulation::ChainSolution& solution = simulated.solution;
+  for (const PoseSolution& pose : solution.poses)
+    if (pose.second_shape_mm > second_shape_bound_mm) return Outcome::target_not_met;
+  if (solution.round_trip_max_mm <= round_trip_bound_mm) return Outcome::done;
+  if (simulated.inverse != "newton") {
+    run.warn(
+        fmt::format("the round trip ends {:.2e} mm from the imaged shape (bound {:.0e} mm): {} is not the inverse; "
+                    "use --inverse newton",
+                    solution.round_trip_max_mm, round_trip_bound_mm, simulated.inverse));
+    return Outcome::target_not_met;
+  }
+  run.warn(
+      fmt::format("the round trip ends {:.2e} mm from the imaged shape (bound {:.0e} mm): loading the undeformed "
+                  "shape again finds another equilibrium, so the prediction is one of several",
+                  solution.round_trip_max_mm, round_trip_bound_mm));
+  return Outcome::target_not_met;
+}
+
+const Points& shape_of(const simulation::ChainSolution& solution, const std::string& imaged_pose,
+                       const std::string& name) {
+  if (name == simulation::free_of_load) return solution.X;
+  if (name == imaged_pose) return solution.prone;
+  std::vector<std::string> names = {imaged_pose, simulation::free_of_load};
+  for (const PoseSolution& pose : solution.poses) {
+    if (pose.name == name) return pose.x;
+    names.push_back(pose.name);
+  }
+  throw InputError(fmt::format("there is no shape \"{}\"; there are {}", name, listed(names)));
+}
+
+const Points& shape_of(const Simulated& simulated, const std::string& name) {
+  return shape_of(simulated.solution, simulated.loads.front().name, name);
+}
+
+Json shape_figures(const CaseInputs& in, const Simulated& simulated, const std::string& name) {
+  const simulation::ChainSolution& solution = simulated.solution;
+  const Points& x = shape_of(simulated, name);
+  if (name == simulation::free_of_load) return figures_of(in, simulated, solution.inverse, x);
+  if (name == simulated.loads.front().name)
+    return figures_of(in, simulated, solution.round_trip.report, in.mesh.points);
+  const auto pose = std::find_if(solution.poses.begin(), solution.poses.end(),
+                                 [&name](const PoseSolution& one) { return one.name == name; });
+  Json f = figures_of(in, simulated, pose->report, x);
+  f["second_shape_mm"] = pose->second_shape_mm;
+  return f;
+}
+
+void write_shape(const CaseInputs& in, const Simulated& simulated, const std::string& name,
+                 const std::filesystem::path& file) {
+  const simulation::ChainSolution& solution = simulated.solution;
+  const Points& x = shape_of(simulated, name);
+  meshing::NamedTables at_points;
+  if (name == simulated.loads.front().name && name != simulation::free_of_load)
+    at_points = {{"round_trip_error_mm", (solution.round_trip.x - solution.prone).rowwise().norm()}};
+  meshing::write_pose(in.mesh, x, at_points, {{"det_f", simulation::cell_det_f(in.mesh.cells, x, solution.X)}}, file,
+                      in.description.side);
+}
+
+void say_simulated(const Run& run, const CaseInputs& in, const Simulated& simulated) {
+  const simulation::ChainSolution& solution = simulated.solution;
+  const std::string& imaged = in.description.imaged_pose;
+  const auto row = [&](const std::string& what, const simulation::SolveReport& report, const Points& x) {
+    const Eigen::VectorXd moved = (x - in.mesh.points).rowwise().norm();
+    run.say(fmt::format("  {:<24}{:>8.2f}{:>8.2f}{:>8}{:>8}{:>10.3f}", what, rms(moved), moved.maxCoeff(),
+                        report.newton_iterations, report.load_steps, report.min_det_f));
+  };
+  run.say(fmt::format("{} nodes, {} tetrahedra of order {}; load number ρgH/E = {:.2f}", in.mesh.points.rows(),
+                      in.mesh.cells.rows(), in.mesh.order(), simulation::load_number(in.anatomy, in.model)));
+  run.say(fmt::format("  {:<24}{:>8}{:>8}{:>8}{:>8}{:>10}", "moved from " + imaged + ", mm", "rms", "max", "Newton",
+                      "steps", "min det F"));
+  row("undeformed", solution.inverse, solution.X);
+  for (const PoseSolution& pose : solution.poses) row(pose.name, pose.report, pose.x);
+  if (imaged == simulation::free_of_load)
+    return run.say("  imaged free of load: its shape is the undeformed one, there is no inverse and no round trip");
+  run.say(fmt::format("  round trip undeformed → {}: {:.2e} mm at most (bound {:.0e}), {} Newton steps", imaged,
+                      solution.round_trip_max_mm, round_trip_bound_mm, solution.round_trip.report.newton_iterations));
+}
+
+}  // namespace supine::pipeline
