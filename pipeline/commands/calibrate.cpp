@@ -107,6 +107,8 @@ class CalibrateTool : public Tool {
     check_method();
     claim_targets(run);
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
+    if (method_ == "cmaes") measured_->check_covers_skin("--method cmaes");
+    if (until_mae_) measured_->check_covers_skin("--until-mae");
     simulation::Model model = with_population(run, measured_->description, measured_->model);
     if (scan_offset_) add_scan_offset(model);
     FreeParameters parameters(model);
@@ -177,6 +179,7 @@ class CalibrateTool : public Tool {
     const calibration::FitOptions options = fit_options(run, evaluator, live);
     CalibrationResult result;
     result.method = method_;
+    result.object = measured_->description.is_object();
     result.noise_mm = options.noise_mm;
     run.stage("fit");
     Eigen::MatrixXd posterior;

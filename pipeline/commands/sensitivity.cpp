@@ -72,6 +72,7 @@ class SensitivityTool : public Tool {
         draws_.empty() ? DrawRange{0, static_cast<std::size_t>(samples_)} : parse_draw_range(draws_);
     if (range.end > most_samples) throw InputError(fmt::format("--draws {}: at most {} draws", draws_, most_samples));
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
+    measured_->check_covers_skin(name());
     const FreeParameters parameters(with_population(run, measured_->description, measured_->model));
     const DrawKind kind = law_ == "normal" ? DrawKind::normal : DrawKind::prior;
     const auto draws = calibration::draw_parameters(parameters, kind, static_cast<int>(range.end), seed_);
