@@ -151,14 +151,13 @@ class Scorer {
   }
 
   /// T at the typical size. Many effects grow slower than their slope at the null: where the catalogue's size was
-  /// solved, what it changes counts. Where that is more than the slope promises, it is what a modulus that bends as much
-  /// takes away again, and which is freed along its slope alone here: the smaller of the two.
+  /// solved, what it changes counts.
   static double expected(const Candidate& candidate, const Projected& p) {
+    if (p.secant.size() > 0) return p.secant_square;
     double sum = 0;
     for (Eigen::Index k = 0; k < p.slope.cols(); ++k)
       sum += p.slope.col(k).squaredNorm() * std::pow(candidate.parameters[static_cast<std::size_t>(k)].typical, 2);
-    const double along_slope = sum / static_cast<double>(p.slope.cols());
-    return p.secant.size() > 0 ? std::min(p.secant_square, along_slope) : along_slope;
+    return sum / static_cast<double>(p.slope.cols());
   }
 
   const Residuals& residuals_;

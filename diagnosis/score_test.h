@@ -26,7 +26,7 @@ struct Score {
   bool beyond_range;        ///< a step leaves three times the range from null to bound: right shape, implausible amount
   double predicted_rms_mm;  ///< of all points after the joint linear step, steps cut at the bounds
   double predicted_held_out_rms_mm;  ///< the same, every block of skin predicted without itself
-  double noncentrality;       ///< λ, T expected beyond noise at the typical size: along slope or secant, the smaller
+  double noncentrality;       ///< λ, T expected beyond noise at the typical size: along the secant where there is one
   double power;               ///< chance that T at the typical size is above what 5 % of scans without any effect reach
   double expected_ln_factor;  ///< ½(λ − q ln(1 + λ/q)), of the evidence for it where it is there at its typical size,
                               ///< under a normal prior as wide as that (Laplace, over noise)
