@@ -25,8 +25,9 @@ class PointCloud {
 
   /// What lies closest to a query point.
   struct Hit {
-    int point;                ///< nearest point
-    Eigen::Vector3d closest;  ///< on the local sphere; of a contour, or further off than reach_spacings, the nearest point itself
+    int point;  ///< nearest point
+    Eigen::Vector3d
+        closest;  ///< on the local sphere; of a contour, or further off than reach_spacings, the nearest point itself
     bool beyond_border;  ///< past the last points: a contour, further off than reach_spacings, or all on one side
   };
   Hit closest(const Eigen::Vector3d& query) const;

@@ -267,10 +267,11 @@ class CompareTool : public Tool {
     const std::string covers = little ? fmt::format("it covers {:.0f} % of the skin (usual: over {:.0f} %), ",
                                                     100 * comparison.covered_fraction, 100 * low_coverage)
                                       : "";
-    run.warn(fmt::format("{} hardly fits this body: {}half of its points lie more than {:.1f} mm off. {}, a scan that "
-                         "is not registered, or a model far from the truth?",
-                         inputs.pose.surface->string(), covers, comparison.scan.median_mm,
-                         inputs.measured.is_object() ? "Another object" : "Another patient or side"));
+    run.warn(
+        fmt::format("{} hardly fits this body: {}half of its points lie more than {:.1f} mm off. {}, a scan that "
+                    "is not registered, or a model far from the truth?",
+                    inputs.pose.surface->string(), covers, comparison.scan.median_mm,
+                    inputs.measured.is_object() ? "Another object" : "Another patient or side"));
   }
 
   static void say(const Run& run, const Pose& pose, const Comparison& comparison,

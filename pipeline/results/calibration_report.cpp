@@ -104,11 +104,12 @@ std::vector<std::string> calibration_remarks(const FreeParameters& parameters, c
   };
   const simulation::Model model = parameters.model(result.fit.u);
   const double modulus = model.skin.young_modulus_kpa.value, thickness = model.skin.thickness_mm.value;
-  if (modulus > 0) remarks.push_back(fmt::format("the skin enters as modulus × thickness only: {:.4g} kPa × {:.4g} mm = {:.4g} kPa mm{}",
-                                modulus, thickness, modulus * thickness,
-                                is_free("skin.young_modulus_kpa") && is_free("skin.thickness_mm")
-                                    ? "; both are free, which no data can settle"
-                                    : ""));
+  if (modulus > 0)
+    remarks.push_back(fmt::format(
+        "the skin enters as modulus × thickness only: {:.4g} kPa × {:.4g} mm = {:.4g} kPa mm{}", modulus, thickness,
+        modulus * thickness,
+        is_free("skin.young_modulus_kpa") && is_free("skin.thickness_mm") ? "; both are free, which no data can settle"
+                                                                          : ""));
   remarks.push_back(fmt::format(
       "stiffness enters as stiffness / density only: with another density than {:.4g} kg/m3 every modulus and spring "
       "changes in proportion",

@@ -149,8 +149,8 @@ TEST(RegisterScan, RowsAlongAPrismDoNotSayHowFarAlongItTheyLie) {
   Scene scene([](double x, double) { return 0.01 * x * x; });
   make_contour(scene, 30, 5);
   for (Eigen::Index p = 0; p < scene.problem.points.rows(); ++p)
-    scene.problem.points(p, 2) += 0.01 * std::pow(scene.problem.points(p, 0), 2) -
-                                  height(scene.problem.points(p, 0), scene.problem.points(p, 1));
+    scene.problem.points(p, 2) +=
+        0.01 * std::pow(scene.problem.points(p, 0), 2) - height(scene.problem.points(p, 0), scene.problem.points(p, 1));
   const auto weak = weak_directions(scene.registered().fit);
   ASSERT_EQ(weak.size(), 1u);
   EXPECT_FALSE(weak.front().turn);
