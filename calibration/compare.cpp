@@ -96,7 +96,8 @@ Comparison compare(const ModelSkin& model, const Scan& scan, const SkinAreas& ar
   Comparison result;
   model_to_scan(scan, model.node_points(), model.node_normals(), bounds, result.model_to_scan);
   result.mae_study_mm = mae_of_covered(result.model_to_scan);
-  result.covered_fraction = covered_share(model, result.model_to_scan);
+  result.covered_fraction =
+      scan.is_contour() ? std::numeric_limits<double>::quiet_NaN() : covered_share(model, result.model_to_scan);
 
   scan_to_model(model, scan.points(), result.scan_to_model);
   result.used = !result.scan_to_model.closest.on_border;

@@ -30,7 +30,7 @@ struct LandmarkError {
 /// A model in one pose against a measured surface.
 struct Comparison {
   double mae_study_mm;  ///< study's S13: mean |d| model skin points → scan, over the covered ones; NaN without any
-  double covered_fraction;       ///< share of the skin's area whose points are covered
+  double covered_fraction;       ///< share of the skin's area whose points are covered; NaN: a contour covers none
   DistanceFigures scan;          ///< scan → model, over the used scan points
   std::vector<AreaError> areas;  ///< those that have skin, in the order of SkinAreas::names
 

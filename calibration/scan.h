@@ -27,6 +27,8 @@ class Scan {
   /// The points that were measured: those of the triangles, or all of a cloud; #P by 3.
   const Points& points() const { return distance_.points(); }
   const SurfaceDistance& distance() const { return distance_; }
+  /// As the contour in an image: covers nothing.
+  bool is_contour() const { return distance_.is_contour(); }
 
  private:
   SurfaceDistance distance_;

@@ -42,7 +42,7 @@ struct ModelToScan {
 /// d = |c − x|, + where the scan point c lies on the outer side of the model at x: sign of n · (c − x).
 /// Covered: c is inside the scan (not on an open edge, not past the last points of a cloud), closer than the bound,
 /// and the normals are within the angle. The scan's normals are those of its points, weighted to c; the normals of a
-/// cloud count in either sense.
+/// cloud count in either sense. A contour covers nothing.
 /// @param points   #Q by 3, of the model, mm
 /// @param normals  #Q by 3, unit, outward
 /// @throws InputError  bounds out of range, sizes that differ

@@ -215,6 +215,7 @@ void SurfaceDistance::closest(const Points& queries, ClosestPoints& result) cons
 }
 
 bool SurfaceDistance::is_cloud() const { return state_->triangles.rows() == 0; }
+bool SurfaceDistance::is_contour() const { return is_cloud() && state_->cloud->is_contour(); }
 const Points& SurfaceDistance::points() const { return state_->points; }
 const Triangles& SurfaceDistance::triangles() const { return state_->triangles; }
 const Points& SurfaceDistance::normals() const { return is_cloud() ? state_->cloud->normals() : state_->vertex_normal; }

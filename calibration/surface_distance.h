@@ -45,10 +45,12 @@ class SurfaceDistance {
   void closest(const Points& queries, ClosestPoints& result) const;
 
   bool is_cloud() const;
+  /// Bare points in rows along lines (PointCloud): they say where a surface passes and cover none of it.
+  bool is_contour() const;
   const Points& points() const;
   const Triangles& triangles() const;
   /// #P by 3, unit; angle-weighted mean of the faces around each point, zero where a point has none; of a cloud the
-  /// normals of the local fits.
+  /// normals of the local fits, of a contour zero.
   const Points& normals() const;
   /// Areas of the triangles, #T, mm²; empty for a cloud.
   const Eigen::VectorXd& areas_mm2() const;

@@ -157,9 +157,17 @@ class SoftSkin {
   std::optional<calibration::SurfaceDistance> skin_;
 };
 
+/// Points that say the same: each counts for less.
+Problem with_repeats(Problem problem) {
+  const auto drawn = static_cast<double>(std::min<Eigen::Index>(fit_points, problem.points.rows()));
+  if (problem.independent_points) problem.noise_mm *= std::sqrt(std::max(1.0, drawn / *problem.independent_points));
+  return problem;
+}
+
 }  // namespace
 
-Fit fit(const Problem& problem, const RigidTransform& start, const Belief& belief) {
+Fit fit(const Problem& given, const RigidTransform& start, const Belief& belief) {
+  const Problem problem = with_repeats(given);
   const std::vector<int> rows = drawn_rows(problem.points.rows(), fit_points);
   const Eigen::RowVector3d centre = problem.points.colwise().mean();
   Fit found;

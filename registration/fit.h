@@ -22,7 +22,7 @@ struct Belief {
 };
 
 /// Generalised least squares of up to 320 matched points and the landmarks, with Gaussian errors
-///   noise²                                          of each point, white, and
+///   noise²                                          of each point, white, times how many of them say the same, and
 ///   misfit² (n_i · n_j) κ(|x_i − x_j|/length)       of the body's shape against the prediction, κ Matérn 3/2,
 /// an isotropic random displacement field seen along the normals (landmarks: along each axis). What is rigid has the
 /// spread rigid_sigma_mm over 40 mm in its place. Misfit and length are not known: the answer is the mean over a grid

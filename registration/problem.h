@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,8 +33,9 @@ struct Problem {
   Points points;   ///< #P by 3, frame of the scan, mm
   Points normals;  ///< #P by 3, unit, either sense; zero: not known
   std::vector<Landmark> landmarks;
-  double noise_mm = 0.7;        ///< of the scanner along the normal, 1 sigma, > 0
-  double rigid_sigma_mm = 0.3;  ///< of the imaged place of what is rigid, 1 sigma, ≥ 0
+  double noise_mm = 0.7;                     ///< of the scanner along the normal, 1 sigma, > 0
+  std::optional<double> independent_points;  ///< that the scan is worth, where several points say the same; none: all
+  double rigid_sigma_mm = 0.3;               ///< of the imaged place of what is rigid, 1 sigma, ≥ 0
 };
 
 }  // namespace supine::registration

@@ -173,6 +173,15 @@ simulation::Model MeasuredCase::begin_with(simulation::Model wanted) const {
   return wanted;
 }
 
+void MeasuredCase::check_covers_skin(const std::string& what) const {
+  if (std::any_of(fitted.begin(), fitted.end(), [](const Measurement& m) { return !m.scan.is_contour(); })) return;
+  throw InputError(
+      fmt::format("{}: a contour (rows of points along lines), which covers no skin; {} goes by the MAE model to scan, "
+                  "over the skin that is covered. Take supine-calibrate --method least-squares or joint, or a scan of "
+                  "a surface",
+                  description.pose(fitted.front().pose.name).surface->string(), what));
+}
+
 calibration::MeasuredScene MeasuredCase::fitted_scene() const { return scene_of(*this, false, false); }
 
 calibration::MeasuredScene MeasuredCase::marked_scene() const { return scene_of(*this, false, true); }

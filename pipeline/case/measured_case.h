@@ -35,6 +35,9 @@ struct MeasuredCase : CaseInputs {
   /// @throws InputError  landmarks that lie elsewhere than the model as given can have them (check_landmarks())
   calibration::MeasuredScene marked_scene() const;
   calibration::MeasuredScene whole_scene() const;
+  /// @param what  goes by the MAE model to scan: "--method cmaes"
+  /// @throws InputError  every fitted scan is a contour, which covers no skin
+  void check_covers_skin(const std::string& what) const;
   /// Of each measurement of a scene: as the case says, or estimated from the distances to the given model.
   /// @param evaluator  of fitted_scene() or whole_scene()
   std::vector<double> noise_mm(calibration::Evaluator& evaluator) const;

@@ -21,7 +21,7 @@ bool lies_on(const ScanCase& in, const char* what) {
 
 std::string toml_of(const Case& description) { return (description.folder / "case.toml").string(); }
 
-/// Unit normals of the scan's points, neighbours agreeing; zero where there is none.
+/// Unit normals of the scan's points, neighbours agreeing; zero where there is none, as of a contour.
 Points normals_of(const reconstruction::Surface& scan) {
   Triangles triangles = scan.triangles;
   if (triangles.rows() > 0) calibration::orient_pieces(calibration::SurfaceTopology(scan.points, triangles), triangles);
@@ -120,6 +120,7 @@ ScanCase read_scan_case(const Case& description, const Pose& pose, const fs::pat
   in.problem.normals = normals_of(in.scan);
   if (lies_on(in, "landmarks")) add_landmarks(description, pose, shape, in);
   if (pose.noise_mm) in.problem.noise_mm = *pose.noise_mm;
+  in.problem.independent_points = pose.independent_points;
   in.problem.rigid_sigma_mm = description.segmentation_mm.value_or(in.problem.rigid_sigma_mm);
   return in;
 }

@@ -107,7 +107,7 @@ class CompareTool : public Tool {
                      inputs.measured.side, run.output(png_));
     say(run, inputs.pose, comparison, landmarks);
     if (agreement) say_agreement(run, *agreement);
-    doubt(run, scan_name, comparison);
+    doubt(run, inputs, comparison);
     return Outcome::done;
   }
 
@@ -215,7 +215,7 @@ class CompareTool : public Tool {
     figures["p95_mm"] = comparison.scan.p95_mm;
     figures["hausdorff_mm"] = comparison.scan.hausdorff_mm;
     figures["mean_signed_mm"] = comparison.scan.mean_signed_mm;
-    figures["covered_fraction"] = comparison.covered_fraction;
+    figures["covered_fraction"] = number_or_null(comparison.covered_fraction);
     figures["noise_mm"] = pose.noise_mm ? Json(*pose.noise_mm) : Json(nullptr);
     figures["model_points"] = comparison.model_to_scan.covered.size();
     figures["scan_points"] = comparison.used.size();
@@ -257,14 +257,21 @@ class CompareTool : public Tool {
                         agreement.chi_squared, agreement.degrees));
   }
 
+  static bool covers_area(const Comparison& comparison) { return std::isfinite(comparison.covered_fraction); }
+
   // A scan that covers little of the skin or lies far from it is more likely somebody else's than a finding.
-  static void doubt(Run& run, const std::string& scan_name, const Comparison& comparison) {
+  static void doubt(Run& run, const Inputs& inputs, const Comparison& comparison) {
     constexpr double low_coverage = 0.5, far_mm = 8;
-    if (comparison.covered_fraction >= low_coverage && comparison.scan.median_mm <= far_mm) return;
-    run.warn(fmt::format(
-        "{} hardly fits this body: it covers {:.0f} % of the skin (usual: over {:.0f} %), half of its points lie more "
-        "than {:.1f} mm off. Another patient or side, a scan that is not registered, or a model far from the truth?",
-        scan_name, 100 * comparison.covered_fraction, 100 * low_coverage, comparison.scan.median_mm));
+    const bool little = covers_area(comparison) && comparison.covered_fraction < low_coverage;
+    if (!little && comparison.scan.median_mm <= far_mm) return;
+    const std::string covers = little ? fmt::format("it covers {:.0f} % of the skin (usual: over {:.0f} %), ",
+                                                    100 * comparison.covered_fraction, 100 * low_coverage)
+                                      : "";
+    run.warn(
+        fmt::format("{} hardly fits this body: {}half of its points lie more than {:.1f} mm off. {}, a scan that "
+                    "is not registered, or a model far from the truth?",
+                    inputs.pose.surface->string(), covers, comparison.scan.median_mm,
+                    inputs.measured.is_object() ? "Another object" : "Another patient or side"));
   }
 
   static void say(const Run& run, const Pose& pose, const Comparison& comparison,
@@ -282,7 +289,10 @@ class CompareTool : public Tool {
     row("maximum", comparison.scan.hausdorff_mm);
     row("signed mean (> 0: scan outside)", comparison.scan.mean_signed_mm);
     if (pose.noise_mm) row("scanner noise, 1 sigma", *pose.noise_mm);
-    run.say(fmt::format("  {:.0f} % of the skin covered; {} of {} scan points used", 100 * comparison.covered_fraction,
+    run.say(fmt::format("  {}; {} of {} scan points used",
+                        covers_area(comparison)
+                            ? fmt::format("{:.0f} % of the skin covered", 100 * comparison.covered_fraction)
+                            : "a contour, which covers no area",
                         comparison.scan_points_used, comparison.used.size()));
     say_areas(run, comparison);
     if (!landmarks.empty()) run.say(fmt::format("  {:<34}{:>8}", "landmark", "mm"));

@@ -81,7 +81,8 @@ std::vector<std::string> calibration_remarks(const FreeParameters& parameters, c
       remarks.push_back(
           fmt::format("{} ended at an end of its range ({:.4g} {}): the data pull it further, or say nothing about it",
                       names[static_cast<std::size_t>(i)], parameters.value(i, result.fit.u[i]), parameters.unit(i)));
-  for (const Eigen::Index i : calibration::outside_tissue(parameters, result.fit.u)) {
+  for (const Eigen::Index i :
+       result.object ? std::vector<Eigen::Index>{} : calibration::outside_tissue(parameters, result.fit.u)) {
     const std::string& name = names[static_cast<std::size_t>(i)];
     const calibration::TissueRange range = calibration::tissue_range(name).value();
     remarks.push_back(fmt::format(
@@ -103,11 +104,12 @@ std::vector<std::string> calibration_remarks(const FreeParameters& parameters, c
   };
   const simulation::Model model = parameters.model(result.fit.u);
   const double modulus = model.skin.young_modulus_kpa.value, thickness = model.skin.thickness_mm.value;
-  remarks.push_back(fmt::format("the skin enters as modulus × thickness only: {:.4g} kPa × {:.4g} mm = {:.4g} kPa mm{}",
-                                modulus, thickness, modulus * thickness,
-                                is_free("skin.young_modulus_kpa") && is_free("skin.thickness_mm")
-                                    ? "; both are free, which no data can settle"
-                                    : ""));
+  if (modulus > 0)
+    remarks.push_back(fmt::format(
+        "the skin enters as modulus × thickness only: {:.4g} kPa × {:.4g} mm = {:.4g} kPa mm{}", modulus, thickness,
+        modulus * thickness,
+        is_free("skin.young_modulus_kpa") && is_free("skin.thickness_mm") ? "; both are free, which no data can settle"
+                                                                          : ""));
   remarks.push_back(fmt::format(
       "stiffness enters as stiffness / density only: with another density than {:.4g} kg/m3 every modulus and spring "
       "changes in proportion",

@@ -13,7 +13,8 @@ namespace supine::pipeline {
 
 /// A calibrated model with what it is worth, whatever method found it.
 struct CalibrationResult {
-  std::string method;  ///< least-squares, joint or cmaes
+  std::string method;   ///< least-squares, joint or cmaes
+  bool object = false;  ///< the body is not of tissue
   calibration::Fit fit;
   calibration::Uncertainty uncertainty;
   std::vector<calibration::Interval> intervals;

@@ -10,6 +10,7 @@
 #include "common/statistics.h"
 #include "diagnosis/diagnosis_file.h"
 #include "diagnosis/evidence/nuisance_words.h"
+#include "diagnosis/over_sets.h"
 #include "simulation/parameters.h"
 
 namespace supine::pipeline {
@@ -154,11 +155,16 @@ Json singles_json(const Findings& found) {
 
 Json included_json(const Findings& found) {
   Json list = Json::array();
-  for (const diagnosis::Inclusion& one : found.included)
+  for (const diagnosis::Inclusion& one : found.included) {
+    Json numbers = Json::array();
+    for (const diagnosis::FittedParameter& p : diagnosis::over_sets(found, one.effect))
+      numbers.push_back({{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"interval95", {p.low, p.high}}});
     list.push_back({{"effect", one.effect},
                     {"probability", one.probability},
                     {"bayes_factor", one.bayes_factor},
-                    {"left_out_gain", one.left_out_gain}});
+                    {"left_out_gain", one.left_out_gain},
+                    {"numbers", numbers}});
+  }
   return list;
 }
 

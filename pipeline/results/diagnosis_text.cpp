@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "diagnosis/evidence/nuisance_words.h"
+#include "diagnosis/over_sets.h"
 #include "pipeline/results/diagnosis_report.h"
 
 namespace supine::pipeline {
@@ -108,6 +109,15 @@ void say_verdict(const Run& run, const Findings& found) {
   }
 }
 
+/// Of what the verdict names: its numbers, where several sets hold it.
+void say_numbers(const Run& run, const Findings& found) {
+  std::vector<std::string> named = found.diagnosis.missing;
+  named.insert(named.end(), found.diagnosis.ambiguous_rest.begin(), found.diagnosis.ambiguous_rest.end());
+  for (const std::string& name : named)
+    if (const auto numbers = diagnosis::over_sets(found, name); !numbers.empty())
+      run.say(fmt::format("  {}, whichever set holds it: {}", name, values_of(numbers)));
+}
+
 /// What the verdict would be where another prior changes it.
 void say_other_priors(const Run& run, const Findings& found) {
   for (const diagnosis::OtherPrior& other : found.under_other_priors) {
@@ -155,6 +165,7 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result) {
                   b.registration, b.numerical, b.parameters, b.patchiness, b.model_form));
   run.say("  where:    " + where(result.hot_spots));
   say_verdict(run, found);
+  say_numbers(run, found);
   say_other_priors(run, found);
   say_limits(run, result);
 }

@@ -55,6 +55,7 @@ class Calibration {
     const calibration::FitOptions options = fit_options(evaluator);
     CalibrationResult result;
     result.method = asked_.method;
+    result.object = measured_.description.is_object();
     result.noise_mm = options.noise_mm;
     run_.stage("fit");
     Eigen::MatrixXd posterior;
@@ -228,6 +229,8 @@ void CalibrateOptions::check() const {
 }
 
 FreeParameters parameters_to_fit(Run& run, const MeasuredCase& measured, const CalibrateOptions& options) {
+  if (options.method == "cmaes") measured.check_covers_skin("--method cmaes");
+  if (options.until_mae_mm) measured.check_covers_skin("--until-mae");
   simulation::Model model = with_population(run, measured.description, measured.model);
   if (options.scan_offset) add_scan_offset(model);
   FreeParameters parameters(model);

@@ -37,6 +37,7 @@ Draws draw(Run& run, const FreeParameters& parameters, const std::string& law, i
 
 SensitivityRows run_draws(Run& run, const MeasuredCase& measured, const FreeParameters& parameters, const Draws& draws,
                           const DrawRange& range, calibration::RunJournal& journal) {
+  measured.check_covers_skin("supine-sensitivity");
   SensitivityRows rows{
       range, {draws.values.begin() + static_cast<std::ptrdiff_t>(range.first), draws.values.end()}, {}};
   if (journal.known() > 0) run.say(fmt::format("  going on after {} chain runs", journal.known()));

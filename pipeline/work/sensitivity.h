@@ -19,6 +19,7 @@ calibration::Draws draw(Run& run, const calibration::FreeParameters& parameters,
 
 /// Runs the chain for the draws of a range. Says how far it is.
 /// @pre  the range ends with the draws
+/// @throws InputError  a scan that covers no area
 SensitivityRows run_draws(Run& run, const MeasuredCase& measured, const calibration::FreeParameters& parameters,
                           const calibration::Draws& draws, const DrawRange& range, calibration::RunJournal& journal);
 

@@ -52,6 +52,20 @@ TEST(Compare, FlatScanBelowTheModelByHand) {
   EXPECT_NEAR(result.model_to_scan.to_scan.distance_mm[12], -2, 1e-13);
 }
 
+TEST(Compare, AContourSaysHowFarOffItsPointsAreAndCoversNothing) {
+  const Plate plate;
+  const ModelSkin model = plate.skin();
+  const Scan scan({testing::contour(5, 35, [](double, double) { return -2.0; }), Triangles(0, 3), {}}, model);
+  const Comparison result = compare(model, scan, plate.areas);
+  EXPECT_EQ(result.scan_points_used, scan.points().rows());
+  EXPECT_NEAR(result.scan.rms_mm, 2, 1e-12);
+  EXPECT_NEAR(result.scan.mean_signed_mm, -2, 1e-12);
+  EXPECT_EQ(result.model_to_scan.covered.count(), 0);
+  EXPECT_TRUE(std::isnan(result.covered_fraction));
+  EXPECT_TRUE(std::isnan(result.mae_study_mm));
+  EXPECT_EQ(result.areas.at(0).scan_points + result.areas.at(1).scan_points, scan.points().rows());
+}
+
 TEST(Compare, ASpikeIsNamedAndCountsInAllFiguresButOne) {
   const reconstruction::Surface plate = testing::sheet(0, 40, 4);
   const ModelSkin model(plate.points, plate.triangles);

@@ -81,6 +81,17 @@ reconstruction::Surface without(const reconstruction::Surface& surface,
   return {surface.points, surface.triangles(kept, Eigen::all), {}};
 }
 
+Points contour(double low, double high, const std::function<double(double, double)>& height) {
+  constexpr double along_mm = 0.5, apart_mm = 10;
+  const int count = static_cast<int>((high - low) / along_mm) + 1, rows = static_cast<int>((high - low) / apart_mm) + 1;
+  Points points(count * rows, 3);
+  for (int p = 0; p < points.rows(); ++p) {
+    const double x = low + along_mm * (p % count), y = low + apart_mm * (p / count);
+    points.row(p) << x, y, height(x, y);
+  }
+  return points;
+}
+
 Points random_points(int count, double low, double high, unsigned seed) {
   std::mt19937 generator(seed);
   std::uniform_real_distribution<double> uniform(low, high);

@@ -21,6 +21,11 @@ reconstruction::Surface sheet(
 reconstruction::Surface without(const reconstruction::Surface& surface,
                                 const std::function<bool(const Eigen::Vector3d&)>& drop);
 
+/// A contour: rows of points 0.5 mm apart along x from @p low to @p high, one at every 10 mm of y between them.
+/// @param height  z as a function of x and y
+Points contour(
+    double low, double high, const std::function<double(double, double)>& height = [](double, double) { return 0.0; });
+
 /// Random points in the box, the same for the same seed.
 Points random_points(int count, double low, double high, unsigned seed);
 

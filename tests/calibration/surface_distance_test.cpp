@@ -157,6 +157,26 @@ TEST(PointCloudDistance, BorderIsWhereThePointsEnd) {
   for (int i = 0; i < 6; ++i) EXPECT_EQ(closest.on_border[i], beyond[i]) << i;
 }
 
+TEST(PointCloudDistance, RowsAlongLinesAreAContourAndPointsSpreadOverASurfaceAreNot) {
+  const SurfaceDistance rows(testing::contour(0, 40), Triangles(0, 3));
+  EXPECT_TRUE(rows.is_contour());
+  EXPECT_TRUE(rows.normals().isZero(0));
+  Points queries(2, 3);
+  queries << 20, 20, 3, 20, 24, 0;  // over a row, between two
+  ClosestPoints closest;
+  rows.closest(queries, closest);
+  EXPECT_NEAR(closest.distance_mm[0], 3, 1e-12);
+  EXPECT_NEAR(closest.distance_mm[1], 4, 1e-12);
+  EXPECT_TRUE(closest.on_border.all());
+  for (const Points& surface : {testing::sheet(0, 40, 20).points, testing::sphere(30, 3).points})
+    EXPECT_FALSE(SurfaceDistance(surface, Triangles(0, 3)).is_contour());
+  Points patch = testing::random_points(2000, 0, 40, 3);
+  patch.col(2).setZero();
+  EXPECT_FALSE(SurfaceDistance(patch, Triangles(0, 3)).is_contour());
+  const auto ball = testing::sphere(30, 2);
+  EXPECT_FALSE(SurfaceDistance(ball.points, ball.triangles).is_contour());
+}
+
 TEST(PointCloudDistance, SphereErrorFallsFasterThanTheSquareOfTheSpacing) {
   Points queries = testing::random_points(200, -1, 1, 8);
   queries.rowwise().normalize();

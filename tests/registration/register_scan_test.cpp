@@ -53,7 +53,8 @@ struct Scene {
   void move(const Eigen::Matrix3d& by, const Eigen::Vector3d& shift = Eigen::Vector3d::Zero()) {
     problem.points = (problem.points * by.transpose()).rowwise() + shift.transpose();
     problem.normals = problem.normals * by.transpose();
-    problem.normals.rowwise().normalize();
+    for (Eigen::Index p = 0; p < problem.normals.rows(); ++p)
+      problem.normals.row(p) = problem.normals.row(p).normalized().eval();  // zero stays zero
     for (Landmark& l : problem.landmarks) l.scan = by * l.scan + shift;
   }
 
@@ -112,6 +113,58 @@ TEST(RegisterScan, ItsRegionHoldsTheTruthWithoutLandmarks) {
     EXPECT_LT(rms_off_mm(scene.problem, found.fit.transform, by.inverse()), 2) << draw;
   }
   EXPECT_EQ(held, draws);
+}
+
+/// Rows of points in place of the surface, as given without normals.
+void make_contour(Scene& scene, double half_width, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, 0.5);
+  scene.problem.points = testing::contour(-half_width, half_width, height);
+  for (Eigen::Index p = 0; p < scene.problem.points.rows(); ++p) scene.problem.points(p, 2) += noise(random);
+  scene.problem.normals = calibration::SurfaceDistance(scene.problem.points, Triangles(0, 3)).normals();
+}
+
+TEST(RegisterScan, LaysAContourOnTheBody) {
+  int held = 0;
+  constexpr int draws = 4;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int draw = 0; draw < draws; ++draw) {
+    Scene scene;
+    make_contour(scene, 45, 200 + draw);
+    Motion motion;
+    for (int k = 0; k < 6; ++k) motion[k] = (k < 3 ? 12 : 0.15) * uniform(random);
+    const RigidTransform by = turned_about({0, 0, 20}, motion);
+    scene.move(by.rotation, by.shift);
+    const Registration found = scene.registered();
+    held += mahalanobis_squared(found.fit, by.inverse()) <= chi_squared_quantile(6, 0.95);
+    EXPECT_LT(rms_off_mm(scene.problem, found.fit.transform, by.inverse()), 2) << draw;
+    EXPECT_GT(found.overlap, 0.95);
+    EXPECT_FALSE(found.worse_than_given());
+  }
+  EXPECT_GE(held, draws - 1);
+}
+
+TEST(RegisterScan, RowsAlongAPrismDoNotSayHowFarAlongItTheyLie) {
+  Scene scene([](double x, double) { return 0.01 * x * x; });
+  make_contour(scene, 30, 5);
+  for (Eigen::Index p = 0; p < scene.problem.points.rows(); ++p)
+    scene.problem.points(p, 2) +=
+        0.01 * std::pow(scene.problem.points(p, 0), 2) - height(scene.problem.points(p, 0), scene.problem.points(p, 1));
+  const auto weak = weak_directions(scene.registered().fit);
+  ASSERT_EQ(weak.size(), 1u);
+  EXPECT_FALSE(weak.front().turn);
+  EXPECT_GT(std::abs(weak.front().axis.y()), 0.95);
+}
+
+TEST(RegisterScan, PointsThatSayTheSameCountForLess) {
+  Scene scene;
+  make_contour(scene, 45, 6);
+  scene.problem.noise_mm = 2;
+  const Registration all = scene.registered();
+  scene.problem.independent_points = 20;
+  const Registration few = scene.registered();
+  EXPECT_GT(few.fit.covariance.trace(), 1.5 * all.fit.covariance.trace());
 }
 
 TEST(RegisterScan, SaysThatARoundBodyDoesNotFixTheTurn) {

@@ -16,11 +16,13 @@ import os
 import pathlib
 import re
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
 
 HERE = pathlib.Path(__file__).parent
+SAMPLES = HERE.parents[2] / "samples" / "silicone_bar"
 LONGEST_S = 120
 
 # The command line of each tool; CASE and OUT are the copy's.
@@ -42,6 +44,16 @@ COMMANDS = {
     "warp": "{case} -o {out}/carried",
     "cohort": "{case}/many -o {out}/pooled",
 }
+
+
+# The same of a body that is no breast: rows of the tables that begin with `object`.
+OBJECT_COMMANDS = COMMANDS | {
+    "reconstruct": "{case} -o {out}",
+    "tetrahedralise": "{out}/coarse.vtp {out}/muscle.vtp --case {case} --order 1 -o {out}/mesh.vtu",
+    "compare": "{case} {out}/hanging.vtu -o {out}",
+    "register": "{case} --pose hanging --shape {out}/hanging.vtu -o {out}/placed",
+}
+BREAST_FILES, OBJECT_FILES = ("case.toml", "model.toml", "labels.nrrd", "supine.ply"), ("case.toml", "model.toml", "bar.obj", "scan.ply", "outline.ply")
 
 
 class BadRow(Exception):
@@ -133,7 +145,8 @@ def change(folder, text, extra):
 
 def command_of(row, folder, binaries, extra):
     """The tool's command line; an option that the row gives takes the place of the usual one."""
-    words = [word.format(case=folder, out=folder / "out") for word in COMMANDS[row["tool"]].split()]
+    commands = OBJECT_COMMANDS if row["object"] else COMMANDS
+    words = [word.format(case=folder, out=folder / "out") for word in commands[row["tool"]].split()]
     for option in (word for word in extra if word.startswith("-") and word in words):
         at = words.index(option)
         del words[at:at + 2]
@@ -145,8 +158,34 @@ def contents(folder):
     return {path.relative_to(folder): (path.stat().st_size, path.stat().st_mtime_ns) for path in folder.rglob("*") if path.is_file()}
 
 
-def copy_run(run, folder):
-    for name in ("case.toml", "model.toml", "labels.nrrd", "supine.ply"):
+def write_obj(stl, target):
+    """A binary STL as an OBJ, whose lines can be changed one by one."""
+    data = stl.read_bytes()
+    rows, faces = {}, []
+    for t in range(struct.unpack("<I", data[80:84])[0]):
+        numbers = struct.unpack("<9f", data[96 + 50 * t:132 + 50 * t])
+        faces.append([rows.setdefault(numbers[k:k + 3], len(rows) + 1) for k in (0, 3, 6)])
+    target.write_text("".join("v %r %r %r\n" % p for p in rows) + "".join("f %d %d %d\n" % tuple(f) for f in faces))
+
+
+def make_object_run(binaries, folder):
+    """The bar of two parts on a coarse mesh of linear cells, and a contour of another bar."""
+    case = (SAMPLES / "joined" / "case.toml").read_text()
+    (folder / "case.toml").write_text(case.replace("../bar.stl", "bar.obj"))
+    write_obj(SAMPLES / "bar.stl", folder / "bar.obj")
+    for name, source in (("model.toml", "joined/model.toml"), ("scan.ply", "joined/scan.ply"), ("outline.ply", "moldstar/outline.ply")):
+        shutil.copyfile(SAMPLES / source, folder / name)
+    steps = {tool: OBJECT_COMMANDS[tool] for tool in ("reconstruct", "tetrahedralise", "simulate")}
+    steps = {"reconstruct": steps["reconstruct"], "decimate": "{out}/breast.vtp --edge-mm 15 --sharp-deg 40 -o {out}/coarse.vtp"} | steps
+    (folder / "out").mkdir()
+    for tool, words in steps.items():
+        command = [str(binaries / f"supine-{tool}"), *(w.format(case=folder, out=folder / "out") for w in words.split()), "--force", "--threads", "1"]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return folder
+
+
+def copy_run(run, folder, files):
+    for name in files:
         shutil.copyfile(run / name, folder / name)
     (folder / "out").mkdir()
     for name in os.listdir(run / "out"):
@@ -158,7 +197,7 @@ def try_row(row, binaries, run):
     """What is wrong with the tool's answer; empty: nothing."""
     with tempfile.TemporaryDirectory(prefix="supine-wrong-") as name:
         folder, extra = pathlib.Path(name), []
-        copy_run(run, folder)
+        copy_run(run, folder, OBJECT_FILES if row["object"] else BREAST_FILES)
         for text in row["changes"]:
             change(folder, text, extra)
         before = contents(folder)
@@ -186,7 +225,7 @@ def read_table(file):
         cells = [cell.strip() for cell in line.split(" | ")]
         if len(cells) != 4:
             sys.exit(f"{file}:{number}: a row has four cells parted by ' | ', this one has {len(cells)}")
-        rows.append({"where": f"{file.name}:{number}", "tool": cells[0], "changes": [c.strip() for c in cells[1].split(";;")],
+        rows.append({"where": f"{file.name}:{number}", "object": file.name.startswith("object"), "tool": cells[0], "changes": [c.strip() for c in cells[1].split(";;")],
                      "code": int(cells[2]), "words": [word.strip() for word in cells[3].split(";") if word.strip()]})
     return rows
 
@@ -200,10 +239,12 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
     rows = [row for table in given.tables or sorted(HERE.glob("*.txt")) for row in read_table(table) if given.only in str(row)]
-    with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+    with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool, tempfile.TemporaryDirectory(prefix="supine-object-") as made:
+        bar = make_object_run(given.bin.resolve(), pathlib.Path(made)) if any(row["object"] for row in rows) else None
+
         def judged(row):
             try:
-                return try_row(row, given.bin.resolve(), given.run.resolve())
+                return try_row(row, given.bin.resolve(), bar if row["object"] else given.run.resolve())
             except (BadRow, OSError, ValueError, SyntaxError) as error:
                 return [f"the row itself is wrong: {error}"]
         answers = list(pool.map(judged, rows))
