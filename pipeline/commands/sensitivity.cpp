@@ -66,6 +66,7 @@ class SensitivityTool : public Tool {
         draws_.empty() ? DrawRange{0, static_cast<std::size_t>(samples_)} : parse_draw_range(draws_);
     if (range.end > most_samples) throw InputError(fmt::format("--draws {}: at most {} draws", draws_, most_samples));
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
+    measured_->check_covers_skin(name());  // before a journal is begun
     const FreeParameters parameters(with_population(run, measured_->description, measured_->model));
     const auto draws = draw(run, parameters, law_, static_cast<int>(range.end), seed_);
     run.stage("runs");
