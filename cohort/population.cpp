@@ -66,7 +66,7 @@ Grid half_normal_grid(double scale, int count) {
 
 /// The patients as arrays.
 struct Patients {
-  ArrayXd mean, variance, anchor, ln_factor;
+  ArrayXd mean, variance, anchor, ln_factor;  // variance: of the likelihood and of what is never known
   bool with_strength;
 
   explicit Patients(const EffectEvidence& e) {
@@ -82,10 +82,11 @@ struct Patients {
         variance[i] = HUGE_VAL;
         continue;
       }
-      mean[i] = p.strength->mean, variance[i] = p.strength->sd * p.strength->sd;
+      const double seen = p.strength->sd * p.strength->sd;
+      mean[i] = p.strength->mean, variance[i] = seen + e.null_sd * e.null_sd;
       // The case's own evidence stands; the normal law only says how it changes with the population's strengths.
-      anchor[i] = p.ln_bayes_factor - (ln_normal(mean[i] - e.prior_mean, variance[i] + e.prior_sd * e.prior_sd) -
-                                       ln_normal(mean[i], variance[i]));
+      anchor[i] = p.ln_bayes_factor -
+                  (ln_normal(mean[i] - e.prior_mean, seen + e.prior_sd * e.prior_sd) - ln_normal(mean[i], variance[i]));
     }
   }
 

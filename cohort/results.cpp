@@ -136,6 +136,7 @@ void gather(const CaseResults& one, const Json& single, Gathered& into) {
     patient.strength = likelihood_of({n.at("mean"), n.at("sd")}, prior);
     into.number = n.at("name");
     into.evidence.prior_mean = prior.mean, into.evidence.prior_sd = prior.sd;
+    into.evidence.null_sd = n.value("null_sd", 0.0);
     if (const double usual = n.at("usual"); usual != 0) {
       into.mm_per_unit += n.at("usual_moves_mm").get<double>() / std::abs(usual);
       ++into.with_number;

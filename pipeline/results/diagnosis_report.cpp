@@ -108,6 +108,13 @@ Json hypotheses_json(const Findings& found) {
   return list;
 }
 
+/// 1 sigma of a number where the effect is not missing: that of the nuisance which the effect replaces, else 0.
+double null_sd(const Findings& found, const std::string& number) {
+  for (const diagnosis::Nuisance& nuisance : found.base.nuisances)
+    if (nuisance.name() == "/" + number) return nuisance.sigma;
+  return 0;
+}
+
 /// Every effect by itself, as the evidence of many patients is put together from (cohort/population.h): posterior and
 /// prior of its numbers, as offsets from the null, and how far the usual size of one moves the fitted points.
 Json singles_json(const Findings& found) {
@@ -143,6 +150,7 @@ Json singles_json(const Findings& found) {
                          {"sd", known.second},
                          {"prior_mean", prior.mean() - p.null},
                          {"prior_sd", prior.sd()},
+                         {"null_sd", null_sd(found, p.name)},
                          {"usual", p.typical - p.null},
                          {"usual_moves_mm", rms(usual)}});
     }

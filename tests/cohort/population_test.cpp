@@ -131,5 +131,23 @@ TEST(Population, WithoutStrengthsBayesFactorsAloneGiveTheShare) {
   EXPECT_FALSE(found.mean);
 }
 
+TEST(Population, ANumberThatIsNeverKnownAndNearItsExpectationInAllIsNoEffect) {
+  // Nobody has it, and the number is nearer to its null in everyone than a case takes for granted.
+  constexpr double seen_sd = 0.2, prior_sd = 1.0, null_sd = 0.3;
+  EffectEvidence evidence;
+  evidence.prior_mean = 0, evidence.prior_sd = prior_sd;
+  std::mt19937_64 engine(5);
+  std::normal_distribution<double> seen(0, seen_sd);
+  for (int i = 0; i < 30; ++i) {
+    const double x = seen(engine);
+    evidence.patients.push_back(
+        {ln_normal(x, seen_sd * seen_sd + prior_sd * prior_sd) - ln_normal(x, seen_sd * seen_sd + null_sd * null_sd),
+         Likelihood{x, seen_sd}});
+  }
+  EXPECT_GT(pool_effect(evidence, 0.1).probability, 0.95) << "what a population narrower than that pretends";
+  evidence.null_sd = null_sd;
+  EXPECT_LT(pool_effect(evidence, 0.1).probability, 0.2);
+}
+
 }  // namespace
 }  // namespace supine::cohort
