@@ -44,7 +44,7 @@ struct EffectEvidence {
   };
   std::vector<Patient> patients;
   double prior_mean = 0, prior_sd = 1;  ///< of the strength in a patient who has it
-  double null_sd = 0;                   ///< of the number where the effect is not there: what is never known of it
+  double null_sd = 0;  ///< of the number where the effect is not there: what is never known of it, 1 sigma, its unit
   /// 1 sigma of the strength that the model's own error, the same in all patients, pretends; 0: none.
   double shared_sd = 0;
 };

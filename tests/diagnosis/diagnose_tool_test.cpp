@@ -66,6 +66,15 @@ TEST_F(DiagnoseTool, ExaminesTheModelAsGivenWithItsFixedEffects) {
   const Json without = examined(case_ / "model.toml"), with = examined(tied);
   for (const Json& candidate : with.at("candidates")) EXPECT_NE(candidate.at("effect"), "ligament");
   EXPECT_NE(with.at("base_parameters"), without.at("base_parameters"));
+  // What a cohort takes for known of a number where nothing is missing: the sigma of the same nuisance.
+  bool replaces_a_nuisance = false;
+  for (const Json& single : without.at("singles"))
+    for (const Json& number : single.at("numbers")) {
+      if (number.at("name") != "incompressibility.log_factor") continue;
+      replaces_a_nuisance = true;
+      EXPECT_NEAR(number.at("null_sd").get<double>(), 0.3, 1e-12);
+    }
+  EXPECT_TRUE(replaces_a_nuisance);
 }
 
 TEST_F(DiagnoseTool, TakesTheBodyToBeAsUnevenAsTheModelFileSays) {
