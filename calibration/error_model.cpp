@@ -104,7 +104,7 @@ Clusters clusters_of(const Residuals& residuals, const std::vector<int>& order, 
   clusters.pose = residuals.pose(centres);
   clusters.kind.resize(count);
   for (Eigen::Index c = 0; c < count; ++c) clusters.kind[c] = residuals.kind(centres[static_cast<std::size_t>(c)]);
-  clusters.place = clusters.means(residuals.place);
+  clusters.place = clusters.means(residuals.on_skin);
   return clusters;
 }
 

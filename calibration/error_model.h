@@ -12,7 +12,9 @@ namespace supine::calibration {
 /// Scanners smooth: the noise of points 2 mm apart is not independent. Means over small clusters hide that, and lose
 /// nothing of what varies slowly over the skin.
 struct Clusters {
-  Points place;              ///< #C by 3, means
+  /// #C by 3, means of Residuals::on_skin. Scan points lie off the skin by the very distances that are to be explained:
+  /// a smooth field over them follows those distances through its slope across the skin.
+  Points place;
   Eigen::VectorXi pose;      ///< #C
   Eigen::VectorXi kind;      ///< #C, Residuals::kind
   Eigen::VectorXd members;   ///< #C, points in each

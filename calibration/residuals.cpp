@@ -20,6 +20,7 @@ Residuals sized(Eigen::Index count, Eigen::Index landmark_rows) {
   residuals.distance_mm.resize(count);
   residuals.sigma_mm.resize(count);
   residuals.place.resize(count, 3);
+  residuals.on_skin.resize(count, 3);
   residuals.q.resize(count, 2);
   residuals.pose.resize(count);
   residuals.point.resize(count);
@@ -47,6 +48,7 @@ void add_landmarks(const MeasuredScene& scene, const Prediction& prediction, Res
         residuals.distance_mm[row] = landmarks.measured(l, axis) - landmarks.predicted(l, axis);
         residuals.sigma_mm[row] = scene.landmarks[m]->sigma_mm[l];
         residuals.place.row(row) = landmarks.measured.row(l);
+        residuals.on_skin.row(row) = landmarks.predicted.row(l);
         residuals.q.row(row) = chart_of_closest(residuals, static_cast<int>(m), landmarks.measured.row(l));
         residuals.pose[row] = static_cast<int>(m);
         residuals.point[row] = static_cast<int>(3 * l) + axis;
@@ -58,7 +60,8 @@ void add_landmarks(const MeasuredScene& scene, const Prediction& prediction, Res
 
 Residuals Residuals::skin() const {
   const Eigen::Index rows = skin_rows();
-  return {skin_mm(), sigma_mm.head(rows), place.topRows(rows), q.topRows(rows), pose.head(rows), point.head(rows)};
+  return {skin_mm(),       sigma_mm.head(rows), place.topRows(rows), on_skin.topRows(rows),
+          q.topRows(rows), pose.head(rows),     point.head(rows)};
 }
 
 Residuals residuals_of(const MeasuredScene& scene, const Prediction& prediction, const PointMask& mask,
@@ -75,6 +78,7 @@ Residuals residuals_of(const MeasuredScene& scene, const Prediction& prediction,
       residuals.distance_mm[row] = distances.distance_mm[i];
       residuals.sigma_mm[row] = noise_mm[m];
       residuals.place.row(row) = prediction.poses[m].scan_points.row(i);
+      residuals.on_skin.row(row) = distances.closest.point.row(i);
       residuals.q.row(row).setZero();
       for (int k = 0; k < 3; ++k)
         residuals.q.row(row) +=

@@ -20,6 +20,7 @@ struct Residuals {
   Eigen::VectorXd distance_mm;     ///< #R, > 0 where the scan lies outside the model
   Eigen::VectorXd sigma_mm;        ///< #R, of the scanner along the normal; of a landmark along the axis
   Points place;                    ///< #R by 3, the scan points; measured places of landmarks
+  Points on_skin;                  ///< #R by 3, the closest points of the model's skin; predicted places of landmarks
   Table q;                         ///< #R by 2, anatomy coordinates (Anatomy::chart) of the closest skin point
   Eigen::VectorXi pose;            ///< #R, row of MeasuredScene::measurements
   Eigen::VectorXi point;           ///< #R, row of its scan; of a landmark 3 × row of MeasuredLandmarks + axis

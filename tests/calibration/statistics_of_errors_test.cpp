@@ -25,6 +25,7 @@ Residuals patch(int count, double noise_mm, double shared_mm, double length_mm, 
     const double x = uniform(generator), y = uniform(generator);
     r.place.row(i) << x, y, -(x * x + y * y) / 150;
   }
+  r.on_skin = r.place;
   r.q = r.place.leftCols<2>() / 60;
   r.sigma_mm = Eigen::VectorXd::Constant(count, noise_mm);
   r.pose = Eigen::VectorXi::Zero(count);
@@ -46,7 +47,7 @@ Residuals permuted(const Residuals& r, unsigned seed) {
   std::shuffle(order.begin(), order.end(), std::mt19937(seed));
   Residuals p = r;
   p.distance_mm = r.distance_mm(order);
-  p.place = r.place(order, Eigen::all);
+  p.place = p.on_skin = r.place(order, Eigen::all);
   p.q = r.q(order, Eigen::all);
   return p;
 }
@@ -108,7 +109,8 @@ TEST(ErrorModel, NoiseThatNeighboursShareCountsAsThatOfFewerPoints) {
   const Residuals single = patch(400, 0.6, 0, 10, 12);
   Residuals r = patch(1600, 0.6, 0, 10, 12);
   for (Eigen::Index i = 0; i < 1600; ++i) {
-    r.place.row(i) = single.place.row(i / 4) + Eigen::RowVector3d(0.3 * (i % 2), 0.3 * ((i / 2) % 2), 0);
+    r.place.row(i) = r.on_skin.row(i) =
+        single.place.row(i / 4) + Eigen::RowVector3d(0.3 * (i % 2), 0.3 * ((i / 2) % 2), 0);
     r.distance_mm[i] = single.distance_mm[i / 4];
   }
   const ErrorModel model = fit_error_model(r, smooth_slopes(r));

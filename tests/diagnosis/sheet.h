@@ -19,6 +19,7 @@ inline calibration::Residuals sheet(unsigned seed, int count = 600) {
     r.place.row(i) << uniform(generator), uniform(generator), 0;
     r.distance_mm[i] = normal(generator);
   }
+  r.on_skin = r.place;
   r.q = r.place.leftCols<2>() / 60;
   r.sigma_mm = Eigen::VectorXd::Constant(count, 0.5);
   r.pose = Eigen::VectorXi::Zero(count);

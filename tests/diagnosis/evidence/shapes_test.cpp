@@ -6,7 +6,9 @@
 #include <cmath>
 #include <map>
 
+#include "calibration/signed_distance.h"
 #include "diagnosis/evidence/discrepancy.h"
+#include "diagnosis/evidence/linear_evidence.h"
 #include "diagnosis/evidence/nuisances.h"
 #include "diagnosis/evidence/patchiness.h"
 #include "diagnosis/weighted_fit.h"
@@ -160,6 +162,39 @@ TEST(Discrepancy, HasAMeanSquareOfOneAndIsACovariance) {
   EXPECT_NEAR(kernel.diagonal().mean(), 1, 1e-9);
   EXPECT_LT((kernel - kernel.transpose()).norm(), 1e-9 * kernel.norm());
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(kernel).eigenvalues()[0], -1e-9 * kernel.norm());
+}
+
+/// Twins whose scan is off by white noise alone, which then is all that their distances are.
+struct Noisy {
+  static constexpr double noise_mm = 1.5;
+  Twin twin{{supine::testing::twin_truth(), noise_mm}};
+  simulation::Model model = supine::testing::twin_truth();
+  calibration::Evaluator evaluator{twin.scene(), model, accurate_enough()};
+  calibration::Prediction prediction = evaluator.predict(model);
+  calibration::Residuals residuals =
+      calibration::residuals_of(twin.scene(), prediction, calibration::points_over_skin(prediction), {noise_mm});
+  calibration::Clusters clusters = calibration::cluster_points(residuals, 600);
+  Eigen::VectorXd y = clusters.means(residuals.distance_mm);
+};
+
+TEST(Clusters, LieOnTheSkinHoweverFarTheScanIsOff) {
+  Noisy noisy;
+  const calibration::ModelSkin skin(noisy.twin.mesh, noisy.prediction.solution.poses[0].x);
+  calibration::SignedDistances off;
+  calibration::scan_to_model(skin, noisy.clusters.place, off);
+  const Eigen::VectorXd a = off.distance_mm.array() - off.distance_mm.mean(), b = noisy.y.array() - noisy.y.mean();
+  EXPECT_LT(std::abs(a.dot(b)), 0.1 * b.squaredNorm());
+}
+
+TEST(Discrepancy, ExplainsNoNoise) {
+  Noisy noisy;
+  const simulation::Sensitivities sensitivities(noisy.evaluator.chain(), noisy.model, noisy.prediction.solution);
+  const Eigen::MatrixXd kernel =
+      discrepancy_of(noisy.twin.mesh, sensitivities, noisy.prediction, noisy.residuals, noisy.clusters).kernel;
+  const Eigen::MatrixXd errors = (std::pow(Noisy::noise_mm, 2) * noisy.clusters.members.cwiseInverse()).asDiagonal();
+  const ErrorCovariance covariance(errors, kernel, 1, 10);
+  const double none = covariance.sizes_mm()[0], large = covariance.sizes_mm().tail<1>()[0];
+  EXPECT_GT(covariance.square(noisy.y, large), 0.75 * covariance.square(noisy.y, none));
 }
 
 }  // namespace
