@@ -188,6 +188,8 @@ def main():
     words = sys.argv[1:]
     try:
         work, paths = words[0], [pathlib.Path(w) for w in words[1:3]]
+        if len(paths) < 2:
+            raise IndexError
         if work == "both":
             both(*paths)
         elif work == "scan":
