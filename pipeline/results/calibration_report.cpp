@@ -180,7 +180,9 @@ void say_calibration(const Run& run, const FreeParameters& parameters, const Cal
   row("fitted points", result.in_sample);
   row("held out, 6 blocks of skin", result.held_out_blocks);
   for (const auto& pose : result.held_out_poses) row("held out, pose " + pose.pose, pose.figures);
-  run.say(fmt::format("  {:<36}{:>10.3f}", "MAE model to scan (study)", result.fit.prediction.mae_study_mm()));
+  const double study = result.fit.prediction.mae_study_mm();  // a contour covers no area
+  run.say(fmt::format("  {:<36}{:>10}", "MAE model to scan (study)",
+                      std::isnan(study) ? "-" : fmt::format("{:.3f}", study)));
   run.say(fmt::format("  {} chain runs, {} of them without equilibrium; {} steps{}", result.fit.evaluations,
                       result.fit.failed, result.fit.iterations, result.fit.converged ? "" : "; NOT converged"));
   for (const std::string& remark : calibration_remarks(parameters, result)) run.say("  - " + remark);
