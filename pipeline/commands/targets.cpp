@@ -13,6 +13,7 @@
 #include "pipeline/case/model_file.h"
 #include "pipeline/case/population_priors.h"
 #include "pipeline/results/targets_report.h"
+#include "pipeline/work/diagnose.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/embedding.h"
 #include "warp/carry_points.h"
@@ -77,7 +78,10 @@ class TargetsTool : public Tool {
   void declare(CLI::App& app) override {
     app.add_option("case", case_folder_, "case folder, holds case.toml")->required();
     app.add_option("mesh", mesh_file_, "imaged mesh, as supine-tetrahedralise writes it (.vtu)")->required();
-    app.add_option("--model", model_file_, "the model, with its priors (default: CASE/model.toml)");
+    app.add_option(
+        "--model", model_file_,
+        "the model to begin with, as calibrated or as a diagnosis left it; priors of what CASE/model.toml has "
+        "free stand there (default: CASE/model.toml)");
     app.add_option("--points", points_,
                    "points in the image: .csv (name,x,y,z), .fcsv or .mrk.json of 3D Slicer (default: the landmarks of "
                    "the case and the middle of the tumour)")
@@ -120,20 +124,20 @@ class TargetsTool : public Tool {
   }
 
   Outcome by_scan(Run& run) {
-    const auto measured = read_measured_case(run, case_folder_, mesh_file_, model());
+    const CaseToDiagnose known = measure_to_diagnose(run, read_case_inputs(run, case_folder_, mesh_file_, model()));
+    const auto& measured = known.measured;
     const Targets targets = read_targets(run, measured->description, measured->mesh);
-    const simulation::Model given = with_population(run, measured->description, measured->model);
-    calibration::Evaluator evaluator(measured->whole_scene(), given, diagnosis::accurate_enough());
-    const std::vector<double> noise = measured->noise_mm(evaluator);
+    const diagnosis::Subject subject = known.subject();
+    calibration::Evaluator evaluator(subject.scene, subject.start, diagnosis::accurate_enough());
     diagnosis::BaseFitOptions options;
     options.priors = case_priors(measured->description, {});
-    options.priors.patchiness = read_patchiness(measured->model_text);
+    options.priors.patchiness = known.patchiness;
     options.other_meshes = !no_other_meshes_;
     LiveProgress live(run, std::chrono::seconds(0));
     options.progress = [&live](const std::string& what) { live.show(what); };
     run.stage("fit");
     const diagnosis::BaseFit base =
-        diagnosis::fit_base_model(evaluator, given, given, noise, &measured->start, options);
+        diagnosis::fit_base_model(evaluator, subject.given, subject.start, subject.noise_mm, subject.near, options);
     for (const std::string& pose : wanted(measured->description)) {
       run.stage("regions " + pose);
       live.show("regions in " + pose);

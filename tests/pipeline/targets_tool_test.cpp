@@ -80,6 +80,25 @@ TEST_F(TargetsTool, WithoutAScanGoesByPriorsAndIsLessSure) {
   EXPECT_GT(known, 0.3);
 }
 
+TEST_F(TargetsTool, AnotherModelIsWhereTheFitBeginsWithThePriorsOfTheCase) {
+  ASSERT_EQ(run(inside()).code, 0);
+  const Json own = json()["points"];
+  write_text(case_ / "calibrated.toml",
+             replaced(read_text(case_ / "model.toml"), "{ value = 2.0, prior_sd = 1.0, lower = 0.1, upper = 20 }",
+                      "{ value = 1.3, lower = 0.1, upper = 20 }"));
+  std::vector<std::string> words = inside();
+  words.insert(words.end(), {"--model", (case_ / "calibrated.toml").string(), "--force"});
+  const Finished finished = run(words);
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const Json begun = json()["points"];
+  for (std::size_t p = 0; p < own.size(); ++p) {
+    const double sigma_mm = own[p]["sigma_mm"];
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(begun[p]["place_mm"][axis].get<double>(), own[p]["place_mm"][axis].get<double>(), 0.5 * sigma_mm);
+    EXPECT_NEAR(begun[p]["sigma_mm"].get<double>(), sigma_mm, 0.05 * sigma_mm);
+  }
+}
+
 TEST_F(TargetsTool, APointOutsideIsToldAndLeftOut) {
   write_text(case_ / "inside.csv", "name,x,y,z\nnear,0,-33,4\naway,0,-80,0\n");
   const Finished finished = run(inside());
