@@ -12,7 +12,7 @@ namespace {
 
 // Neighbours: what is reached over faces whose middles lie within so many reaches. The samples of two faces that are
 // none lie a reach apart where they are imaged, or further.
-constexpr double neighbours_in_reaches = 3;
+constexpr double neighbours_in_reaches = 2;
 
 /// Samples in the cubes of a grid.
 class Grid {

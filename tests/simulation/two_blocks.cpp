@@ -2,6 +2,7 @@
 #include "tests/simulation/two_blocks.h"
 
 #include <Eigen/Geometry>
+#include <cmath>
 
 #include "tests/support/shapes.h"
 
@@ -12,9 +13,12 @@ using reconstruction::Region;
 
 /// Faces of the plane z = @p height get @p region.
 void set_plane(meshing::TetMesh& mesh, double height, Region region) {
-  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f)
-    if ((mesh.points(mesh.faces.row(f), 2).array() - height).abs().maxCoeff() < 1e-9)
-      mesh.region[f] = static_cast<int>(region);
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
+    bool on_plane = true;
+    for (int corner = 0; corner < 3; ++corner)
+      on_plane = on_plane && std::abs(mesh.points(mesh.faces(f, corner), 2) - height) < 1e-9;
+    if (on_plane) mesh.region[f] = static_cast<int>(region);
+  }
 }
 
 template <class Matrix>
@@ -45,7 +49,8 @@ TwoBlocksScene two_blocks_scene(const TwoBlocks& blocks) {
   TestScene lower{box_mesh(n, n, std::max(1, n / 2), blocks.lower_mm), base.anatomy};
   lower.mesh.muscle = base.mesh.muscle;
   meshing::TetMesh upper = box_mesh(m, m, std::max(1, m / 2), blocks.upper_mm);
-  for (auto* mesh : {&lower.mesh, &upper}) mesh->region.setConstant(static_cast<int>(Region::cut));
+  lower.mesh.region.setConstant(static_cast<int>(Region::cut));
+  upper.region.setConstant(static_cast<int>(Region::cut));
   set_plane(lower.mesh, 0, Region::inner);
   set_plane(lower.mesh, blocks.lower_mm.z(), Region::skin);
   set_plane(upper, 0, Region::skin);
