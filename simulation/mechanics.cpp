@@ -102,7 +102,8 @@ Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anato
                              : make_terms<Tet4, Tri3>(mesh, anatomy, model, layout_, *pattern_);
   volume_ = dynamic_cast<const VolumeStrainTerm*>(terms_.front().get());
   if (model.contact.kind != ContactKind::off) {
-    auto contact = std::make_unique<SkinContactTerm>(rows_of(mesh.faces, layout_.skin.faces), mesh.points, model.contact);
+    auto contact =
+        std::make_unique<SkinContactTerm>(rows_of(mesh.faces, layout_.skin.faces), mesh.points, model.contact);
     contact_ = contact.get();
     terms_.push_back(std::move(contact));
   }

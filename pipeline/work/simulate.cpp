@@ -90,8 +90,7 @@ const PoseSolution* pose_named(const simulation::ChainSolution& solution, const 
 /// Contact pressure on the boundary triangles, kPa: zero where nothing touches, not a number on all but skin.
 Table contact_pressure(const CaseInputs& in, const simulation::ContactFigures& contact) {
   const Eigen::Index cells = in.mesh.cells.rows();
-  Table pressure =
-      Table::Constant(cells + in.mesh.faces.rows(), 1, std::numeric_limits<double>::quiet_NaN());
+  Table pressure = Table::Constant(cells + in.mesh.faces.rows(), 1, std::numeric_limits<double>::quiet_NaN());
   Eigen::Index skin = 0;
   for (Eigen::Index f = 0; f < in.mesh.faces.rows(); ++f)
     if (in.mesh.region[f] == static_cast<int>(reconstruction::Region::skin))

@@ -13,7 +13,8 @@ namespace supine::simulation {
 /// Square over the dofs of a mesh; dof 3 node + axis.
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
 
-/// Sparsity of 3-by-3 node blocks: of a mesh, where nodes are coupled that share a cell, made once; or of any couplings.
+/// Sparsity of 3-by-3 node blocks: of a mesh, where nodes are coupled that share a cell, made once; or of any
+/// couplings.
 class Pattern {
  public:
   /// @param cells  #C by nodes per cell, in [0, nodes)   @param nodes  of the mesh

@@ -259,7 +259,8 @@ bool EquilibriumSolver::by_energy(const Problem& problem) const {
   return problem.unknown == Unknown::deformed && mechanics_.has_energy();
 }
 
-/// The next Newton step, no longer than longest_step_mm and than keeps skin before skin. @return false when there is none
+/// The next Newton step, no longer than longest_step_mm and than keeps skin before skin. @return false when there is
+/// none
 bool EquilibriumSolver::find_step(const Problem& problem, const Points& sought, Attempt& attempt,
                                   Eigen::VectorXd& step) {
   ++attempt.iterations, ++steps_;

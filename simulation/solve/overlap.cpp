@@ -91,12 +91,13 @@ Overlap find_overlap(const meshing::TetMesh& mesh, const Indices& skin, const Po
 std::string overlap_warning(const std::string& name, const Overlap& overlap, const ContactSettings& settings) {
   if (overlap.deepest_mm <= settings.band_mm) return {};
   const Eigen::Vector3d& at = overlap.place_mm;
-  return fmt::format("{}: skin passes through skin, {:.1f} mm deep at ({:.1f}, {:.1f}, {:.1f}) mm{}", name,
-                     overlap.deepest_mm, at.x(), at.y(), at.z(),
-                     settings.kind == ContactKind::off
-                         ? "; [contact] kind = \"skin\" in the model keeps skins apart"
-                         : ", contact notwithstanding: pairs that were left out, or contact.stiffness_kpa_per_mm is too "
-                           "low");
+  return fmt::format(
+      "{}: skin passes through skin, {:.1f} mm deep at ({:.1f}, {:.1f}, {:.1f}) mm{}", name, overlap.deepest_mm, at.x(),
+      at.y(), at.z(),
+      settings.kind == ContactKind::off
+          ? "; [contact] kind = \"skin\" in the model keeps skins apart"
+          : ", contact notwithstanding: pairs that were left out, or contact.stiffness_kpa_per_mm is too "
+            "low");
 }
 
 }  // namespace supine::simulation

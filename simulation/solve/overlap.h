@@ -10,8 +10,8 @@ namespace supine::simulation {
 
 /// Skin that lies inside the body elsewhere: two parts of it stand in one place.
 struct Overlap {
-  int samples = 0;        ///< of the skin (terms/skin_samples.h) that lie inside
-  double deepest_mm = 0;  ///< furthest behind the skin they came through
+  int samples = 0;                                     ///< of the skin (terms/skin_samples.h) that lie inside
+  double deepest_mm = 0;                               ///< furthest behind the skin they came through
   Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();  ///< there
 };
 

@@ -57,8 +57,8 @@ NineByNine weight_hessian(const Link& link) {
   h.block<3, 3>(0, 3) = s * link.near.slope * link.facing.slope * link.way * link.own.transpose();
   h.block<3, 3>(0, 6) = s * link.near.slope * link.facing.slope * link.way * link.normal.transpose();
   h.block<3, 3>(3, 3) = link.near.value * link.facing.curvature * link.own * link.own.transpose();
-  h.block<3, 3>(3, 6) = link.near.value *
-                        (link.facing.curvature * link.own * link.normal.transpose() + link.facing.slope * one);
+  h.block<3, 3>(3, 6) =
+      link.near.value * (link.facing.curvature * link.own * link.normal.transpose() + link.facing.slope * one);
   h.block<3, 3>(6, 6) = link.near.value * link.facing.curvature * link.normal * link.normal.transpose();
   for (const auto& [row, column] : {std::pair{0, 3}, std::pair{0, 6}, std::pair{3, 6}})
     h.block<3, 3>(column, row) = h.block<3, 3>(row, column).transpose();
@@ -170,8 +170,7 @@ ContactEnergy energy_of(const ContactPoint& point, double stiffness_kpa_per_mm, 
   energy.by_weight = c.slope * psi.value - gap * energy.by_moment;
   energy.by_moment2 = s;
   energy.by_both = (c.slope * psi.slope - energy.by_moment) / d - s * gap;
-  energy.by_weight2 =
-      c.curvature * psi.value + 2 * gap * (energy.by_moment - c.slope * psi.slope) / d + s * gap * gap;
+  energy.by_weight2 = c.curvature * psi.value + 2 * gap * (energy.by_moment - c.slope * psi.slope) / d + s * gap * gap;
   energy.stiffness = c.value * psi.curvature;
   return energy;
 }

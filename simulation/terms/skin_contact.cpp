@@ -45,8 +45,7 @@ LeftOut SkinContactTerm::leave_out(const SkinShape& shape, SkinPairs& pairs) con
   std::set<std::pair<int, int>> faces;
   for (const Touching& touch : touching(pairs, shape)) {
     const int face = SkinSamples::face_of(touch.group.sample);
-    for (const int other : touch.group.opposite)
-      faces.insert(std::minmax(face, SkinSamples::face_of(other)));
+    for (const int other : touch.group.opposite) faces.insert(std::minmax(face, SkinSamples::face_of(other)));
     if (touch.point.gap_mm() >= left.deepest_mm) continue;
     left.deepest_mm = touch.point.gap_mm();
     left.place_mm = shape.place.row(touch.group.sample).transpose();

@@ -15,7 +15,7 @@ namespace supine::simulation {
 /// must be free of force.
 struct LeftOut {
   int pairs = 0;
-  double deepest_mm = 0;  ///< the smallest gap, negative where they overlap
+  double deepest_mm = 0;                               ///< the smallest gap, negative where they overlap
   Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();  ///< there
 };
 

@@ -10,8 +10,8 @@
 namespace supine::simulation {
 namespace {
 
-// Neighbours: what is reached over faces whose middles lie within so many reaches. The samples of two faces that are
-// none lie a reach apart where they are imaged, or further.
+// Neighbours: what is reached over faces whose middles lie within so many reaches, 1.2 edges of such a face. Fewer
+// would take the two sides of a ridge for skins that have passed through each other.
 constexpr double neighbours_in_reaches = 2;
 
 /// Samples in the cubes of a grid.

@@ -30,8 +30,8 @@ class SkinPairs {
 
  private:
   const SkinSamples& samples_;
-  double cell_mm_;                         // edge of the search grid: the largest reach
-  std::vector<std::vector<int>> apart_;    // per face, sorted
+  double cell_mm_;                       // edge of the search grid: the largest reach
+  std::vector<std::vector<int>> apart_;  // per face, sorted
 };
 
 }  // namespace supine::simulation

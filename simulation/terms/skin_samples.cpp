@@ -76,9 +76,9 @@ SkinSamples::Normal SkinSamples::normal(int sample, const Points& x) const {
   const Eigen::Matrix<double, 3, 2> e = edges(sample, x);
   const Eigen::Matrix3d first = cross_matrix(e.col(0)), second = cross_matrix(e.col(1));
   const Eigen::Vector3d product = e.col(0).cross(e.col(1));
-  Normal at{.by_nodes = Row(3, 3 * n), .of_product = Row(3, 3 * n), .unit = product.normalized(), .size = product.norm()};
-  for (int a = 0; a < n; ++a)
-    at.of_product.middleCols<3>(3 * a) = by_second_(p, a) * first - by_first_(p, a) * second;
+  Normal at{
+      .by_nodes = Row(3, 3 * n), .of_product = Row(3, 3 * n), .unit = product.normalized(), .size = product.norm()};
+  for (int a = 0; a < n; ++a) at.of_product.middleCols<3>(3 * a) = by_second_(p, a) * first - by_first_(p, a) * second;
   at.by_nodes = (at.of_product - at.unit * (at.unit.transpose() * at.of_product)) / at.size;
   return at;
 }
@@ -87,10 +87,9 @@ SkinSamples::Block SkinSamples::normal_curvature(int sample, const Normal& at, c
   const int n = nodes_per_face(), p = sample % per_face;
   const double part = at.unit.dot(along);
   const Eigen::Vector3d across = along - part * at.unit;
-  const Eigen::Matrix3d by_product =
-      -(part * (Eigen::Matrix3d::Identity() - at.unit * at.unit.transpose()) + at.unit * across.transpose() +
-        across * at.unit.transpose()) /
-      (at.size * at.size);
+  const Eigen::Matrix3d by_product = -(part * (Eigen::Matrix3d::Identity() - at.unit * at.unit.transpose()) +
+                                       at.unit * across.transpose() + across * at.unit.transpose()) /
+                                     (at.size * at.size);
   Block curvature = at.of_product.transpose() * by_product * at.of_product;
   const Eigen::Matrix3d turn = cross_matrix(across / at.size);
   for (int a = 0; a < n; ++a)

@@ -38,7 +38,8 @@ class ContactTest : public ::testing::TestWithParam<int> {};
 
 // The weight of the upper block goes through a flat contact: what the lower one feels is that weight over its area.
 TEST_P(ContactTest, AFlatContactTransmitsAUniformPressure) {
-  // The lower block is a thin layer on stiff springs, and larger, so that the upper one has no edge to slide off or dig in.
+  // The lower block is a thin layer on stiff springs, and larger, so that the upper one has no edge to slide off or dig
+  // in.
   Stack stack({.lower_mm = {60, 60, 2}, .lower_cubes = 6, .gap_mm = 3, .order = GetParam()});
   stack.model.interface.normal_kpa_per_mm.value = 100;
   Chain chain = stack.chain();
@@ -61,7 +62,8 @@ TEST_P(ContactTest, AFlatContactTransmitsAUniformPressure) {
 TEST_P(ContactTest, WithoutContactSkinPassesThroughSkinAndIsTold) {
   Stack stack({.lower_mm = {60, 60, 20}, .lower_cubes = 6, .gap_mm = 3, .order = GetParam()});
   stack.model.contact.kind = ContactKind::off;
-  const Indices skin = stack.scene.mesh.faces(make_layout(stack.scene.mesh, stack.scene.anatomy).skin.faces, Eigen::all);
+  const Indices skin =
+      stack.scene.mesh.faces(make_layout(stack.scene.mesh, stack.scene.anatomy).skin.faces, Eigen::all);
   Points x = stack.scene.mesh.points;
   EXPECT_EQ(find_overlap(stack.scene.mesh, skin, x).samples, 0);
   x.bottomRows(x.rows() - stack.scene.first_upper).col(2).array() -= 3 + 4.0;
@@ -81,7 +83,8 @@ TEST_P(ContactTest, SensitivitiesPassThroughTheContact) {
   Chain chain = stack.chain();
   const ChainSolution solution = chain.solve(stack.model);
   const Sensitivities sensitivities(chain, stack.model, solution);
-  for (const auto& [name, step] : {std::pair{"breast.young_modulus_kpa", 0.02}, std::pair{"breast.density_kg_m3", 5.0}}) {
+  for (const auto& [name, step] :
+       {std::pair{"breast.young_modulus_kpa", 0.02}, std::pair{"breast.density_kg_m3", 5.0}}) {
     const Points slope = sensitivities.of(name).poses[0];
     ASSERT_GT(slope.norm(), 0) << name;
     const auto moved = [&](double h) -> Points {
