@@ -101,6 +101,12 @@ Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anato
   terms_ = mesh.order() == 2 ? make_terms<Tet10, Tri6>(mesh, anatomy, model, layout_, *pattern_)
                              : make_terms<Tet4, Tri3>(mesh, anatomy, model, layout_, *pattern_);
   volume_ = dynamic_cast<const VolumeStrainTerm*>(terms_.front().get());
+  if (model.contact.kind != ContactKind::off) {
+    auto contact =
+        std::make_unique<SkinContactTerm>(rows_of(mesh.faces, layout_.skin.faces), mesh.points, model.contact);
+    contact_ = contact.get();
+    terms_.push_back(std::move(contact));
+  }
   const auto hold_group = [this, &mesh](const FaceGroup& group) {
     for (const int face : group.faces)
       for (const int node : mesh.faces.row(face)) held_[node] = 1;
@@ -140,13 +146,16 @@ void Mechanics::hold(const Demand& demand, Sums& sums) const {
   if (demand.residual)
     for (std::size_t n = 0; n < held_.size(); ++n)
       if (held_[n]) sums.residual.segment<3>(3 * static_cast<Eigen::Index>(n)).setZero();
-  const auto identity_rows = [this](SparseMatrix& matrix) {
+  const auto hold_rows = [this](SparseMatrix& matrix, double diagonal) {
     for (int column = 0; column < matrix.outerSize(); ++column)
       for (SparseMatrix::InnerIterator entry(matrix, column); entry; ++entry)
-        if (held_[column / 3] || held_[entry.row() / 3]) entry.valueRef() = entry.row() == column ? 1.0 : 0.0;
+        if (held_[column / 3] || held_[entry.row() / 3]) entry.valueRef() = entry.row() == column ? diagonal : 0.0;
   };
-  if (demand.tangent) identity_rows(sums.tangent);
-  if (demand.reference_tangent) identity_rows(sums.reference_tangent);
+  if (demand.tangent) {
+    hold_rows(sums.tangent, 1);
+    hold_rows(sums.contact, 0);
+  }
+  if (demand.reference_tangent) hold_rows(sums.reference_tangent, 1);
 }
 
 double volume_mm3(const Indices& cells, const Points& x) {

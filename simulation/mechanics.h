@@ -7,6 +7,7 @@
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
 #include "simulation/model.h"
+#include "simulation/terms/skin_contact.h"
 #include "simulation/terms/volume_strain.h"
 
 namespace supine::simulation {
@@ -35,6 +36,9 @@ class Mechanics {
   /// The tissue's resistance to a change of each cell's whole volume.
   const VolumeStrainTerm& volume() const { return *volume_; }
 
+  /// Skin on skin; nullptr where the model leaves it off.
+  const SkinContactTerm* contact() const { return contact_; }
+
   /// ∂r/∂p at frozen x and X, mN per unit of p; zero at held nodes.
   void parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const;
 
@@ -47,6 +51,7 @@ class Mechanics {
   std::unique_ptr<Pattern> pattern_;
   std::vector<std::unique_ptr<Term>> terms_;
   const VolumeStrainTerm* volume_ = nullptr;  // one of the terms
+  const SkinContactTerm* contact_ = nullptr;  // one of the terms, if any
   std::vector<char> held_;                    // per node
   bool any_held_ = false;
 };

@@ -28,6 +28,7 @@ enum class SkinLaw { neo_hookean, corotational };
 enum class Compression { tension_field, full };
 enum class InterfaceKind { sliding, elastic, fixed };
 enum class CutKind { elastic, held };
+enum class ContactKind { off, skin };
 enum class DensityReference { imaged, undeformed };
 
 /// One [[effect]] of model.toml; parameter and option names are those of its catalogue entry.
@@ -35,6 +36,13 @@ struct EffectSetting {
   std::string name;
   std::map<std::string, Setting> parameters;
   std::map<std::string, std::string> options;
+};
+
+/// Skin on skin (terms/skin_contact.h): a device that keeps skins apart, no belief, so its numbers are not calibrated.
+struct ContactSettings {
+  ContactKind kind = ContactKind::off;
+  double stiffness_kpa_per_mm = 2.0;  ///< > 0
+  double band_mm = 1.0;               ///< > 0; gap at which the pressure sets in
 };
 
 /// How tissue is held on one support of an object; what is absent is that of [interface].
@@ -75,6 +83,7 @@ struct Model {
     CutKind kind = CutKind::elastic;
     Setting stiffness_kpa_per_mm{1.0};
   } cut;
+  ContactSettings contact;
   std::map<std::string, SupportSetting> supports;  ///< by name, as the mesh has them
   std::vector<EffectSetting> effects;
   /// What differs from pose to pose, by the pose's name: where its scan lies, how gravity falls in it. Acts after the

@@ -97,6 +97,19 @@ void read_supports(const TomlReader& file, Model& model) {
   }
 }
 
+/// [contact]: fixed numbers of a device, none of which is ever fitted.
+void read_contact(const TomlReader& file, Model& model) {
+  using simulation::ContactKind;
+  const auto section = file.sub_table("contact");
+  if (!section) return;
+  simulation::ContactSettings& contact = model.contact;
+  read_choice<ContactKind>(section, "kind", {{"off", ContactKind::off}, {"skin", ContactKind::skin}}, contact.kind);
+  contact.stiffness_kpa_per_mm =
+      section->number("stiffness_kpa_per_mm", {.lower = 1e-3, .upper = 1e3}).value_or(contact.stiffness_kpa_per_mm);
+  contact.band_mm = section->number("band_mm", {.lower = 0.01, .upper = 5}).value_or(contact.band_mm);
+  section->allow_no_more();
+}
+
 void read_choices(const TomlReader& file, Model& model) {
   using namespace simulation;
   const auto breast = file.sub_table("breast"), skin = file.sub_table("skin");
@@ -227,10 +240,11 @@ ModelText read_model_text(const std::filesystem::path& file) {
 simulation::Model read_model(const ModelText& given) {
   const toml::table table = parse_toml(given.text, given.file);
   const TomlReader file(table, given.file, "");
-  file.allow({"breast", "skin", "interface", "supports", "cut", "effect", "patchiness"});
+  file.allow({"breast", "skin", "interface", "supports", "cut", "contact", "effect", "patchiness"});
   Model model;
   read_base(file, model);
   read_supports(file, model);
+  read_contact(file, model);
   read_effects(file, model);
   patchiness_of(file);  // complains of what is wrong there
   return model;

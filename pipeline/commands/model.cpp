@@ -92,6 +92,11 @@ class ModelTool : public Tool {
     for (const Parameter& row : simulation::base_parameters())
       if (simulation::why_not_of(model, row.name).empty())
         say(row.name.c_str(), simulation::base_setting(model, row.name));
+    if (model.contact.kind != simulation::ContactKind::off) {
+      run.say("contact of skin with skin");
+      run.say(fmt::format("  {:<36}{}", "contact.stiffness_kpa_per_mm", model.contact.stiffness_kpa_per_mm));
+      run.say(fmt::format("  {:<36}{}", "contact.band_mm", model.contact.band_mm));
+    }
     for (const auto& effect : model.effects) {
       run.say("effect " + effect.name);
       for (const auto& [key, setting] : effect.parameters) say(key.c_str(), setting);

@@ -71,6 +71,33 @@ Json figures_of(const CaseInputs& in, const Simulated& simulated, const simulati
   return f;
 }
 
+/// What touches in a pose.
+Json contact_figures(const simulation::ContactFigures& contact) {
+  Json f;
+  f["area_cm2"] = contact.area_cm2;
+  f["pressure_max_kpa"] = contact.pressure_kpa;
+  f["overlap_max_mm"] = contact.overlap_mm;
+  if (contact.overlap_mm > 0) f["overlap_at_mm"] = {contact.place_mm.x(), contact.place_mm.y(), contact.place_mm.z()};
+  return f;
+}
+
+const PoseSolution* pose_named(const simulation::ChainSolution& solution, const std::string& name) {
+  for (const PoseSolution& pose : solution.poses)
+    if (pose.name == name) return &pose;
+  return nullptr;
+}
+
+/// Contact pressure on the boundary triangles, kPa: zero where nothing touches, not a number on all but skin.
+Table contact_pressure(const CaseInputs& in, const simulation::ContactFigures& contact) {
+  const Eigen::Index cells = in.mesh.cells.rows();
+  Table pressure = Table::Constant(cells + in.mesh.faces.rows(), 1, std::numeric_limits<double>::quiet_NaN());
+  Eigen::Index skin = 0;
+  for (Eigen::Index f = 0; f < in.mesh.faces.rows(); ++f)
+    if (in.mesh.region[f] == static_cast<int>(reconstruction::Region::skin))
+      pressure(cells + f, 0) = contact.face_kpa[skin++];
+  return pressure;
+}
+
 }  // namespace
 
 const std::map<std::string, InverseMethod>& inverse_methods() {
@@ -154,10 +181,10 @@ Json shape_figures(const CaseInputs& in, const Simulated& simulated, const std::
   if (name == simulation::free_of_load) return figures_of(in, simulated, solution.inverse, x);
   if (name == simulated.loads.front().name)
     return figures_of(in, simulated, solution.round_trip.report, in.mesh.points);
-  const auto pose = std::find_if(solution.poses.begin(), solution.poses.end(),
-                                 [&name](const PoseSolution& one) { return one.name == name; });
+  const PoseSolution* pose = pose_named(solution, name);
   Json f = figures_of(in, simulated, pose->report, x);
   f["second_shape_mm"] = pose->second_shape_mm;
+  if (pose->contact) f["contact"] = contact_figures(*pose->contact);
   return f;
 }
 
@@ -168,8 +195,10 @@ void write_shape(const CaseInputs& in, const Simulated& simulated, const std::st
   meshing::NamedTables at_points;
   if (name == simulated.loads.front().name && name != simulation::free_of_load)
     at_points = {{"round_trip_error_mm", (solution.round_trip.x - solution.prone).rowwise().norm()}};
-  meshing::write_pose(in.mesh, x, at_points, {{"det_f", simulation::cell_det_f(in.mesh.cells, x, solution.X)}}, file,
-                      in.description.side);
+  meshing::NamedTables at_cells = {{"det_f", simulation::cell_det_f(in.mesh.cells, x, solution.X)}};
+  const PoseSolution* pose = pose_named(solution, name);
+  if (pose != nullptr && pose->contact) at_cells.emplace_back("contact_kpa", contact_pressure(in, *pose->contact));
+  meshing::write_pose(in.mesh, x, at_points, at_cells, file, in.description.side);
 }
 
 void say_simulated(const Run& run, const CaseInputs& in, const Simulated& simulated) {
@@ -186,6 +215,10 @@ void say_simulated(const Run& run, const CaseInputs& in, const Simulated& simula
                       "steps", "min det F"));
   row("undeformed", solution.inverse, solution.X);
   for (const PoseSolution& pose : solution.poses) row(pose.name, pose.report, pose.x);
+  for (const PoseSolution& pose : solution.poses)
+    if (pose.contact)
+      run.say(fmt::format("  {}: skin presses on skin over {:.1f} cm2, {:.2f} kPa at most, {:.2f} mm deep at most",
+                          pose.name, pose.contact->area_cm2, pose.contact->pressure_kpa, pose.contact->overlap_mm));
   if (imaged == simulation::free_of_load)
     return run.say("  imaged free of load: its shape is the undeformed one, there is no inverse and no round trip");
   run.say(fmt::format("  round trip undeformed → {}: {:.2e} mm at most (bound {:.0e}), {} Newton steps", imaged,

@@ -5,12 +5,23 @@
 
 namespace supine::simulation {
 
-Pattern::Pattern(const Indices& cells, Eigen::Index nodes) : nodes_(nodes), first_(nodes + 1, 0) {
+namespace {
+
+std::vector<std::vector<int>> nodes_that_share(const Indices& cells, Eigen::Index nodes) {
   std::vector<std::vector<int>> adjacent(nodes);
   for (Eigen::Index c = 0; c < cells.rows(); ++c)
     for (Eigen::Index a = 0; a < cells.cols(); ++a)
       for (Eigen::Index b = 0; b < cells.cols(); ++b) adjacent[cells(c, a)].push_back(cells(c, b));
-  for (Eigen::Index n = 0; n < nodes; ++n) {
+  return adjacent;
+}
+
+}  // namespace
+
+Pattern::Pattern(const Indices& cells, Eigen::Index nodes) : Pattern(nodes_that_share(cells, nodes)) {}
+
+Pattern::Pattern(std::vector<std::vector<int>> adjacent)
+    : nodes_(static_cast<Eigen::Index>(adjacent.size())), first_(nodes_ + 1, 0) {
+  for (Eigen::Index n = 0; n < nodes_; ++n) {
     auto& list = adjacent[n];
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());
@@ -122,13 +133,21 @@ Sums::Sums(const Pattern& pattern)
       tangent(pattern.zero_matrix()),
       reference_tangent(pattern.zero_matrix()) {}
 
+SparseMatrix Sums::whole_tangent() const {
+  if (contact.nonZeros() == 0) return tangent;
+  return tangent + contact;
+}
+
 void Sums::clear(const Demand& demand) {
   energy = 0;
   min_det_f = no_det_f;
   min_cell = -1;
   valid = true;
   if (demand.residual) residual.setZero();
-  if (demand.tangent) std::fill_n(tangent.valuePtr(), tangent.nonZeros(), 0.0);
+  if (demand.tangent) {
+    std::fill_n(tangent.valuePtr(), tangent.nonZeros(), 0.0);
+    contact.resize(0, 0);
+  }
   if (demand.reference_tangent) std::fill_n(reference_tangent.valuePtr(), reference_tangent.nonZeros(), 0.0);
 }
 

@@ -13,17 +13,20 @@ namespace supine::simulation {
 /// Square over the dofs of a mesh; dof 3 node + axis.
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
 
-/// Sparsity of the 3-by-3 node blocks of a mesh: nodes that share a cell. Made once per mesh.
+/// Sparsity of 3-by-3 node blocks: of a mesh, where nodes are coupled that share a cell, made once; or of any
+/// couplings.
 class Pattern {
  public:
   /// @param cells  #C by nodes per cell, in [0, nodes)   @param nodes  of the mesh
   Pattern(const Indices& cells, Eigen::Index nodes);
+  /// @param adjacent  for each node those it is coupled with, in any order and as often as they like; symmetric
+  explicit Pattern(std::vector<std::vector<int>> adjacent);
 
   Eigen::Index dofs() const { return 3 * nodes_; }
   /// A matrix with this pattern and zero values, stored in the order that block() says.
   SparseMatrix zero_matrix() const;
   /// Offset of block (a, b)'s first entry in the value array; its column k, row i is at offset + k * stride(b) + i.
-  /// @pre  nodes a and b share a cell
+  /// @pre  nodes a and b are coupled
   int block(int a, int b) const;
   /// Entries per column of node b.
   int stride(int b) const { return 3 * (first_[b + 1] - first_[b]); }
@@ -79,6 +82,7 @@ struct Sums {
   double energy = 0;                        ///< mN mm
   Eigen::VectorXd residual;                 ///< r = ∂(energy)/∂x, mN, dof 3 node + axis
   SparseMatrix tangent, reference_tangent;  ///< mN/mm
+  SparseMatrix contact;  ///< what touches adds to ∂r/∂x outside of the pattern, in full node blocks; empty for nothing
   double min_det_f = 1;  ///< smallest det F over quadrature points; <= 0 where an element is inverted
   int min_cell = -1;     ///< where
   bool valid = true;     ///< no element is inverted, in x or in X
@@ -88,6 +92,8 @@ struct Sums {
   explicit Sums(const Pattern& pattern);
   /// Zero for what is demanded; what is not keeps its values.
   void clear(const Demand& demand);
+  /// ∂r/∂x: tangent + contact.
+  SparseMatrix whole_tangent() const;
 };
 
 /// Larger than any det F: the smallest of no elements.

@@ -105,6 +105,8 @@ void check_exportable(Solver solver, const meshing::TetMesh& mesh, const meshing
   if (!mesh.support_names.empty())
     refuse(words, "supports with names (an object: springs along and across the normal)",
            "only a breast on its muscle is written");
+  if (model.contact.kind != ContactKind::off)
+    refuse(words, "[contact] (skin on skin by smooth surfaces)", "leave the table out of the model");
   check_model(words, model);
   const Layout layout = make_layout(mesh, anatomy);
   for (const PoseLoad& pose : poses) check_fields(words, model, {mesh, anatomy, layout, pose.name}, pose.gravity);

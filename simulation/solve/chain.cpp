@@ -6,6 +6,7 @@
 #include "common/error.h"
 #include "simulation/model_fields.h"
 #include "simulation/solve/folds.h"
+#include "simulation/solve/overlap.h"
 #include "simulation/solve/pushed_forward.h"
 
 namespace supine::simulation {
@@ -63,6 +64,15 @@ void note_folds(const meshing::TetMesh& mesh, const Points& shape, const std::st
   const Folds folds = find_folds(mesh.cells, shape);
   report.folded_cells = folds.cells;
   if (folds.cells > 0) warnings.push_back(folds_warning(name, folds));
+}
+
+/// Names the pairs of faces that contact leaves alone.
+void note_left_out(const LeftOut& left, const std::string& name, std::vector<std::string>& warnings) {
+  if (left.pairs == 0) return;
+  const Eigen::Vector3d& at = left.place_mm;
+  warnings.push_back(fmt::format(
+      "{}: {} pairs of skin faces {} already, {:.1f} mm at ({:.1f}, {:.1f}, {:.1f}) mm; contact leaves them out", name,
+      left.pairs, left.deepest_mm < 0 ? "overlap" : "touch", std::abs(left.deepest_mm), at.x(), at.y(), at.z()));
 }
 
 /// Where all stiffness grows alike, equilibrium depends on weight over stiffness alone: E / load would carry what E
@@ -131,6 +141,7 @@ ChainSolution Chain::solve_all(const Model& model, const ChainSolution* near, In
 
 void Chain::certify(const Model& model, ChainSolution& solution) {
   solver_.forget();
+  look_for_contact(model, solution);
   solution.round_trip.name = poses_[0].name;
   if (imaged_free_of_load()) {
     solution.round_trip.x = solution.prone;
@@ -143,6 +154,21 @@ void Chain::certify(const Model& model, ChainSolution& solution) {
   solution.round_trip_max_mm = error.maxCoeff();
   solution.round_trip_rms_mm = std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
   if (!mechanics_.has_energy()) look_for_second_shapes(model, solution);
+}
+
+void Chain::look_for_contact(const Model& model, ChainSolution& solution) {
+  const meshing::TetMesh& mesh = mechanics_.mesh();
+  const SkinContactTerm* contact = mechanics_.contact();
+  if (contact != nullptr) {
+    if (!imaged_free_of_load()) note_left_out(contact->left_out_imaged(), poses_[0].name, solution.warnings);
+    note_left_out(contact->left_out(solution.X), free_of_load, solution.warnings);
+  }
+  const Indices skin = mesh.faces(mechanics_.layout().skin.faces, Eigen::all);
+  for (PoseSolution& pose : solution.poses) {
+    if (contact != nullptr) pose.contact = contact->figures({.x = pose.x, .X = solution.X});
+    const std::string warning = overlap_warning(pose.name, find_overlap(mesh, skin, pose.x), model.contact);
+    if (!warning.empty()) solution.warnings.push_back(warning);
+  }
 }
 
 void Chain::look_for_second_shapes(const Model& model, ChainSolution& solution) {

@@ -30,6 +30,7 @@ struct PoseSolution {
   /// Looked for by Chain::certify() and only where forces have no energy (corotational_qr, friction): with one, the
   /// solver goes downhill.
   double second_shape_mm = 0;
+  std::optional<ContactFigures> contact{};  ///< what touches, where the model has [contact]; by Chain::certify()
 };
 
 struct ChainSolution {
@@ -81,7 +82,8 @@ class Chain {
   void limit_work(std::optional<int> most) { solver_.limit_work(most); }
 
   /// Makes the round trip: loads solution.X with the imaged pose's gravity, from no load. Where forces have no energy
-  /// it also looks for a second balanced shape of every pose.
+  /// it also looks for a second balanced shape of every pose. Notes what touches, and warns of skin that passes through
+  /// skin and of pairs of faces that contact leaves out.
   /// @param solution  of @p model by this chain
   /// @throws NumericalFailure  no equilibrium on the way back to the imaged pose
   void certify(const Model& model, ChainSolution& solution);
@@ -95,6 +97,7 @@ class Chain {
   void load(const Model& model, const PoseLoad& pose);
   void solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
   void correct_by_fixed_point(const Model& model, ChainSolution& solution);
+  void look_for_contact(const Model& model, ChainSolution& solution);
   void look_for_second_shapes(const Model& model, ChainSolution& solution);
 
   std::vector<PoseLoad> poses_;

@@ -259,7 +259,8 @@ bool EquilibriumSolver::by_energy(const Problem& problem) const {
   return problem.unknown == Unknown::deformed && mechanics_.has_energy();
 }
 
-/// The next Newton step, no longer than longest_step_mm. @return false when there is none
+/// The next Newton step, no longer than longest_step_mm and than keeps skin before skin. @return false when there is
+/// none
 bool EquilibriumSolver::find_step(const Problem& problem, const Points& sought, Attempt& attempt,
                                   Eigen::VectorXd& step) {
   ++attempt.iterations, ++steps_;
@@ -272,6 +273,8 @@ bool EquilibriumSolver::find_step(const Problem& problem, const Points& sought, 
   if (!found) return false;
   const double longest = step.cwiseAbs().maxCoeff();
   attempt.step_share = std::min(1.0, longest_step_mm / longest);
+  if (problem.unknown == Unknown::deformed && mechanics_.contact() != nullptr)
+    attempt.step_share *= mechanics_.contact()->safe_share(sought, attempt.step_share * step);
   if (attempt.step_share < 1) step *= attempt.step_share;
   attempt.moved_mm = step.cwiseAbs().maxCoeff();
   return true;

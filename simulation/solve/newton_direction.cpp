@@ -47,7 +47,7 @@ bool NewtonDirection::deformed(const State& state, double tolerance, double move
     if (!exact_) mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true}, sums);
     exact_ = true;  // the factor may be of a changed tangent, GMRES solves with the matrix itself
     const auto preconditioner = [this](const Eigen::VectorXd& in, Eigen::VectorXd& out) { factor_->solve(in, out); };
-    return by_gmres(sums.tangent, preconditioner, tolerance, sums, step);
+    return by_gmres(sums.whole_tangent(), preconditioner, tolerance, sums, step);
   }
   if (have_factor_ && !renew_factor_ && !cycling() && (close || factor_->solves_per_factor() >= many_solves)) {
     const int affordable = iterations_per_factor(least_conjugate_gradients, max_conjugate_gradients);
@@ -91,6 +91,27 @@ double NewtonDirection::natural_mm(const Eigen::VectorXd& residual) {
   return preconditioned_residual_.norm();
 }
 
+/// What a factor is made of: the tangent, and what touches, in a pattern that holds every pair that has touched.
+const SparseMatrix& NewtonDirection::whole(const Sums& sums) {
+  if (sums.contact.nonZeros() == 0 && couplings_.nonZeros() == 0) return sums.tangent;
+  whole_ = sums.whole_tangent();
+  if (couplings_.nonZeros() > 0) whole_ = (whole_ + couplings_).eval();
+  if (whole_.nonZeros() == couplings_.nonZeros()) return whole_;
+  couplings_ = whole_;
+  couplings_.coeffs().setZero();
+  cycle_.reset();  // analysed for fewer
+  large_.reset();
+  return whole_;
+}
+
+void NewtonDirection::forget() {
+  have_factor_ = false, shift_ = 0, cycle_failed_ = false;
+  if (couplings_.nonZeros() == 0) return;
+  couplings_.resize(0, 0);
+  cycle_.reset();
+  large_.reset();
+}
+
 /// Points factor_ at what suits mesh and material.
 void NewtonDirection::choose_solver(const SparseMatrix& pattern) {
   const bool cycle = mechanics_.mesh().order() == 2 && pattern.cols() >= least_cycling && !cycle_failed_ &&
@@ -104,7 +125,6 @@ void NewtonDirection::choose_solver(const SparseMatrix& pattern) {
 /// @param close  whether the last step was short
 /// @param step   the Newton step with the new factor, or nullptr when only the factor is wanted
 bool NewtonDirection::factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step) {
-  choose_solver(sums.tangent);
   // The exact tangent where it is positive definite; where it is not, the one without the skin's negative curvature;
   // and if the tissue's is negative too, with a shift not much larger than makes it so: tried from a little under the
   // last one that did.
@@ -120,7 +140,9 @@ bool NewtonDirection::factorise(const State& state, double tolerance, bool close
     ++factorisations_;
     const bool exact = tangent == exact_tangent;
     exact_ = exact;
-    if (!factor_->factorise(sums.tangent, shift)) {
+    const SparseMatrix& matrix = whole(sums);
+    choose_solver(matrix);
+    if (!factor_->factorise(matrix, shift)) {
       if (cycling() && close) return with_factor_instead(state, tolerance, close, sums, step);
       continue;
     }
@@ -169,6 +191,7 @@ bool NewtonDirection::by_conjugate_gradients(double tolerance, double shift, int
                                              Eigen::VectorXd& step) {
   const auto matrix = [&sums, shift](const Eigen::VectorXd& in, Eigen::VectorXd& out) {
     out.noalias() = sums.tangent.transpose() * in;  // symmetric; the transposed product runs in parallel
+    if (sums.contact.nonZeros() > 0) out.noalias() += sums.contact.transpose() * in;
     if (shift != 0) out += shift * in;
   };
   const auto preconditioner = [this](const Eigen::VectorXd& in, Eigen::VectorXd& out) { factor_->solve(in, out); };

@@ -44,7 +44,7 @@ class NewtonDirection {
   double natural_mm(const Eigen::VectorXd& residual);
 
   /// Forgets the kept factor, so that what follows does not depend on what was solved before.
-  void forget() { have_factor_ = false, shift_ = 0, cycle_failed_ = false; }
+  void forget();
 
   /// Whether the last step came from the exact tangent: its length then says how far the answer is.
   bool exact() const { return exact_; }
@@ -61,12 +61,15 @@ class NewtonDirection {
   bool by_gmres(const SparseMatrix& matrix, const LinearMap& preconditioner, double tolerance, const Sums& sums,
                 Eigen::VectorXd& step);
   int iterations_per_factor(int least, int most) const;
+  const SparseMatrix& whole(const Sums& sums);
   void choose_solver(const SparseMatrix& pattern);
   bool cycling() const { return factor_ != nullptr && factor_ == cycle_.get(); }
 
   const Mechanics& mechanics_;
   std::unique_ptr<SpdSolver> cycle_, large_;  // p-multigrid; what make_spd_solver() gives
   SpdSolver* factor_ = nullptr;               // one of them: the one made last
+  SparseMatrix couplings_;                    // zeros: of the mesh and all that has touched; empty while nothing has
+  SparseMatrix whole_;                        // work space
   Krylov krylov_;
   Eigen::VectorXd preconditioned_residual_;  // work space
   bool have_factor_ = false;

@@ -20,7 +20,6 @@ constexpr std::array<std::array<int, 2>, 6> vtk_edges = {{{0, 1}, {1, 2}, {0, 2}
 /// Which corners a node is the mean of, in the numbering of the corners alone; a corner is the mean of itself, twice.
 struct Corners {
   std::vector<std::array<int, 2>> parents;  // per node
-  Indices cells;                            // #C by 4
   int count = 0;
 
   Corners(const Indices& quadratic, Eigen::Index nodes) : parents(static_cast<std::size_t>(nodes), {-1, -1}) {
@@ -28,16 +27,22 @@ struct Corners {
     for (const int node : quadratic.leftCols(4).reshaped()) number[node] = 0;
     for (int& corner : number)
       if (corner == 0) corner = count++;
-    cells.resize(quadratic.rows(), 4);
     for (Eigen::Index c = 0; c < quadratic.rows(); ++c) {
-      for (int a = 0; a < 4; ++a) {
-        const int corner = number[quadratic(c, a)];
-        cells(c, a) = corner;
-        parents[quadratic(c, a)] = {corner, corner};
-      }
+      for (int a = 0; a < 4; ++a) parents[quadratic(c, a)].fill(number[quadratic(c, a)]);
       for (int e = 0; e < 6; ++e)
         parents[quadratic(c, 4 + e)] = {number[quadratic(c, vtk_edges[e][0])], number[quadratic(c, vtk_edges[e][1])]};
     }
+  }
+
+  /// Corners coupled with each, where nodes are coupled as in @p pattern.
+  std::vector<std::vector<int>> adjacent(const SparseMatrix& pattern) const {
+    std::vector<std::vector<int>> corners(count);
+    for (int b = 0; b < static_cast<int>(parents.size()); ++b)
+      for (SparseMatrix::InnerIterator entry(pattern, 3 * b); entry; ++entry)
+        if (entry.row() % 3 == 0)
+          for (const int from : parents[b])
+            for (const int to : parents[entry.row() / 3]) corners[from].push_back(to);
+    return corners;
   }
 };
 
@@ -74,7 +79,7 @@ struct PMultigrid::State {
   State(const SparseMatrix& pattern, const Indices& cells)
       : nodes(static_cast<int>(pattern.cols() / 3)),
         corners(cells, nodes),
-        corner_pattern(corners.cells, corners.count),
+        corner_pattern(corners.adjacent(pattern)),
         corner_matrix(corner_pattern.zero_matrix()),
         corner_factor(corner_matrix) {
     int most = 0;

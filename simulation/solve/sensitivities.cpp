@@ -46,13 +46,16 @@ class Borrowed {
 /// K of one pose, factorised: Cholesky where there is an energy, LU where there is none.
 class TangentSolver {
  public:
-  TangentSolver(Spare<CholeskySolver>& spare_cholesky, Spare<LuSolver>& spare_lu, bool has_energy,
-                const SparseMatrix& tangent, const std::string& pose) {
+  /// @param spare_cholesky, spare_lu  analysed for the pattern of sums.tangent
+  TangentSolver(Spare<CholeskySolver>& spare_cholesky, Spare<LuSolver>& spare_lu, bool has_energy, const Sums& sums,
+                const std::string& pose) {
+    const SparseMatrix tangent = sums.whole_tangent();
+    const bool coupled = tangent.nonZeros() > sums.tangent.nonZeros();  // what touches is another pair in every pose
     bool done = false;
-    if (has_energy) done = cholesky_.emplace(spare_cholesky, tangent)->factorise(tangent);
+    if (has_energy) done = cholesky_.emplace(coupled ? own_cholesky_ : spare_cholesky, tangent)->factorise(tangent);
     if (!done) {
       cholesky_.reset();
-      done = lu_.emplace(spare_lu, tangent)->factorise(tangent);
+      done = lu_.emplace(coupled ? own_lu_ : spare_lu, tangent)->factorise(tangent);
     }
     if (!done) throw NumericalFailure("the tangent at the solution of '" + pose + "' is singular: no sensitivities");
   }
@@ -62,6 +65,8 @@ class TangentSolver {
   }
 
  private:
+  Spare<CholeskySolver> own_cholesky_;
+  Spare<LuSolver> own_lu_;
   std::optional<Borrowed<CholeskySolver>> cholesky_;
   std::optional<Borrowed<LuSolver>> lu_;
 };
@@ -133,7 +138,7 @@ Sensitivities::Sensitivities(Chain& chain, const Model& model, const ChainSoluti
     : state_(std::make_unique<State>(chain, model, solution)) {
   State& s = *state_;
   if (!chain.imaged_free_of_load()) s.linearise(0);
-  s.prone_tangent = s.sums.tangent;
+  s.prone_tangent = s.sums.whole_tangent();
   if (!chain.imaged_free_of_load() &&
       !s.inverse.emplace(chain.spare_lu_, s.sums.reference_tangent)->factorise(s.sums.reference_tangent))
     throw NumericalFailure("the tangent of the undeformed shape is singular: no sensitivities");
@@ -141,7 +146,7 @@ Sensitivities::Sensitivities(Chain& chain, const Model& model, const ChainSoluti
     s.linearise(p);
     s.reference_tangents.push_back(s.sums.reference_tangent);
     s.tangents.push_back(std::make_unique<TangentSolver>(
-        chain.spare_cholesky_, chain.spare_lu_, chain.mechanics().has_energy(), s.sums.tangent, chain.poses()[p].name));
+        chain.spare_cholesky_, chain.spare_lu_, chain.mechanics().has_energy(), s.sums, chain.poses()[p].name));
   }
 }
 

@@ -133,6 +133,18 @@ TEST_F(ModelFile, OnlyTheCorotationalSkinHasAPoissonRatio) {
   EXPECT_EQ(read("[skin]\nlaw = \"corotational\"\npoisson_ratio = 0.3\n").skin.poisson_ratio.value, 0.3);
 }
 
+TEST_F(ModelFile, ContactIsOffUnlessItIsAskedFor) {
+  EXPECT_EQ(read(good).contact.kind, simulation::ContactKind::off);
+  const auto said = read(good + "[contact]\nkind = \"skin\"\nstiffness_kpa_per_mm = 3.5\nband_mm = 0.7\n").contact;
+  EXPECT_EQ(said.kind, simulation::ContactKind::skin);
+  EXPECT_EQ(said.stiffness_kpa_per_mm, 3.5);
+  EXPECT_EQ(said.band_mm, 0.7);
+  EXPECT_THROW(read(good + "[contact]\nkind = \"chest\"\n"), InputError);
+  EXPECT_THROW(read(good + "[contact]\nkind = \"skin\"\nband_mm = 0\n"), InputError);
+  EXPECT_THROW(read(good + "[contact]\nkind = \"skin\"\nstiffness_kpa_per_mm = -1\n"), InputError);
+  EXPECT_THROW(read(good + "[contact]\nkinds = \"skin\"\n"), InputError);
+}
+
 TEST_F(ModelFile, TheSamplesAreRead) {
   for (const char* name : {"ligament", "phantom"})
     EXPECT_NO_THROW(read_model(std::filesystem::path(SUPINE_SOURCE_DIR) / "samples" / name / "model.toml")) << name;
