@@ -85,7 +85,7 @@ TEST_F(TargetsTool, AnotherModelIsWhereTheFitBeginsWithThePriorsOfTheCase) {
   const Json own = json()["points"];
   write_text(case_ / "calibrated.toml",
              replaced(read_text(case_ / "model.toml"), "{ value = 2.0, prior_sd = 1.0, lower = 0.1, upper = 20 }",
-                      "{ value = 1.3, lower = 0.1, upper = 20 }"));
+                      "{ value = 1.3, prior_sd = 0.01, lower = 0.1, upper = 20 }"));
   std::vector<std::string> words = inside();
   words.insert(words.end(), {"--model", (case_ / "calibrated.toml").string(), "--force"});
   const Finished finished = run(words);
