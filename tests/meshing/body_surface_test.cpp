@@ -11,6 +11,7 @@
 #include "meshing/tetrahedra/tetrahedralise.h"
 #include "meshing/topology.h"
 #include "reconstruction/reconstruct.h"
+#include "segmentation/label_map.h"
 #include "tests/pipeline/temporary_folder.h"
 #include "tests/support/shapes.h"
 
@@ -131,6 +132,44 @@ TEST(Parts, ThatOverlapOrHoldNothingAreRefused) {
   TetMesh again = filled();
   const std::string none = complaint([&] { assign_parts(again, {plane("void", {100, 0, 0}, {1, 0, 0})}); });
   EXPECT_NE(none.find("'void' holds nothing"), std::string::npos) << none;
+}
+
+/// The block as a label map of 2 mm: 1 inside, 2 before its near end, 3 behind its far end, 0 beside it.
+segmentation::GreyImage voxel_block() {
+  segmentation::GreyImage values;
+  values.grid.size = {36, 16, 16};
+  values.grid.spacing_mm.setConstant(2);
+  values.grid.origin_mm.setConstant(-5);
+  for (int k = -3; k < 13; ++k)
+    for (int j = -3; j < 13; ++j)
+      for (int i = -3; i < 33; ++i) {
+        const bool beside = std::min(j, k) < 0 || std::max(j, k) >= 10;
+        values.voxels.push_back(i < 0 ? 2 : i >= 30 ? 3 : beside ? 0 : 1);
+      }
+  return values;
+}
+
+TEST(Supports, OfALabelMapGoToTheFacesNearThem) {
+  using segmentation::Tissue;
+  const segmentation::GreyImage values = voxel_block();
+  const segmentation::LabelImage labels =
+      segmentation::map_labels(
+          values, {{0, Tissue::air}, {1, Tissue::adipose}, {2, Tissue::muscle}, {3, Tissue::muscle}}, "block")
+          .image;
+  const Surface body = reconstruction::reconstruct(labels, {}).breast.surface;
+  const DecimateOptions coarser{.target_triangles = 800, .method = DecimateMethod::triangles};
+  TetMesh mesh = tetrahedralise(decimate(body, coarser).surface, TetrahedraliseOptions{});
+  mesh.muscle = reconstruction::reversed_region(body, Region::inner);
+  assign_supports(mesh, segmentation::mark_supports(values, {{"near", {2}}, {"far", {3}}}), values.grid);
+  ASSERT_EQ(mesh.support_names, (std::vector<std::string>{"near", "far"}));
+  const Eigen::VectorXi support = support_of_faces(mesh);
+  for (Eigen::Index f = 0; f < support.size(); ++f) {
+    const double x = face_point(mesh.points, mesh.faces, f, 1.0 / 3, 1.0 / 3).x();
+    if (support[f] >= 0) {
+      EXPECT_EQ(support[f], x < 30 ? 0 : 1) << x;
+    }
+  }
+  for (const int s : {0, 1}) EXPECT_NEAR(support_area(mesh, support, s).area_mm2, 400, 0.1 * 400) << s;
 }
 
 TEST(Supports, ComeBackFromTheFileWithPartsAndFaces) {
