@@ -25,8 +25,8 @@ struct TetMesh {
   Eigen::VectorXi face_cell;       ///< #F, the cell the face belongs to
   reconstruction::Surface muscle;  ///< the breast-facing muscle sheet, normals toward the breast; travels with the mesh
 
-  /// Of an object, what holds it, by name, and of each triangle of `muscle` the row of its support. Empty: the muscle
-  /// is the one support.
+  /// What holds the body, by name, and of each triangle of `muscle` the row of its support. Empty: the muscle is the
+  /// one support.
   std::vector<std::string> support_names;
   Eigen::VectorXi muscle_support;
   /// Named parts (beside the tissues): the share of each in each cell, #C by #parts; a cell's shares may sum to less

@@ -110,4 +110,14 @@ void assign_supports(TetMesh& mesh, const std::vector<BodyPlace>& supports) {
   }
 }
 
+void assign_supports(TetMesh& mesh, const segmentation::SupportVoxels& supports, const segmentation::Grid& grid) {
+  mesh.support_names = supports.names;
+  mesh.muscle_support.resize(mesh.muscle.triangles.rows());
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index t = 0; t < mesh.muscle_support.size(); ++t) {
+    const Eigen::RowVector3d centre = mesh.muscle.points(mesh.muscle.triangles.row(t), Eigen::all).colwise().mean();
+    mesh.muscle_support[t] = segmentation::nearest_support(supports, grid, centre.transpose());
+  }
+}
+
 }  // namespace supine::meshing

@@ -5,6 +5,7 @@
 
 #include "meshing/body_surface.h"
 #include "meshing/tet_mesh.h"
+#include "segmentation/support_voxels.h"
 
 namespace supine::meshing {
 
@@ -16,5 +17,9 @@ void assign_parts(TetMesh& mesh, const std::vector<BodyPlace>& parts);
 /// Fills support_names and muscle_support from the case's supports.
 /// @pre  mesh.muscle is the sheet of with_support_regions()
 void assign_supports(TetMesh& mesh, const std::vector<BodyPlace>& supports);
+
+/// The same from the supports of a label map: that of the voxel nearest to each triangle's centre.
+/// @pre  a voxel belongs to a support
+void assign_supports(TetMesh& mesh, const segmentation::SupportVoxels& supports, const segmentation::Grid& grid);
 
 }  // namespace supine::meshing

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "segmentation/steps/recipe.h"
+#include "segmentation/support_voxels.h"
 #include "segmentation/tissue.h"
 
 namespace supine::pipeline {
@@ -75,7 +76,9 @@ struct Case {
   AllowedCuts cut;
   std::map<int, segmentation::Tissue> labels;  ///< value in the file → tissue (kind = labels)
   std::optional<segmentation::Recipe> recipe;  ///< kind = mri
-  std::vector<NamedPlace> supports, parts;     ///< kind = surface
+  /// With names, where [image.labels] gives some; then muscle beside them is one too. In file order, muscle first.
+  std::vector<segmentation::LabelSupport> label_supports;
+  std::vector<NamedPlace> supports, parts;  ///< kind = surface
 
   /// The imaged one first (of a body imaged free of load one named undeformed, without gravity), then supine where
   /// there is one, then in file order.

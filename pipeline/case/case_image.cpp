@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "common/suggestion.h"
+#include "pipeline/case/case_labels.h"
 #include "pipeline/case/patient_frame.h"
 #include "segmentation/steps/recipe_toml.h"
 
@@ -13,8 +14,6 @@ namespace supine::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
-using segmentation::Tissue;
-using segmentation::tissue_names;
 
 void read_cut(const TomlReader& image, AllowedCuts& cut) {
   const std::vector<std::string> known = {"excluded", "edge", "rim"};
@@ -32,41 +31,6 @@ void read_cut(const TomlReader& image, AllowedCuts& cut) {
   if (!cut.rim) image.fail("rim_mm", "has no effect: add \"rim\" to cut, or leave rim_mm out");
   if (*rim_mm <= 0) image.fail("rim_mm", "must be > 0 mm");
   cut.rim_mm = *rim_mm;
-}
-
-/// What may stand in [image.labels]: the tissues, and `support`, the rigid thing that tissue holds on to, which is what
-/// the muscle is.
-std::vector<std::pair<std::string, Tissue>> label_keys() {
-  std::vector<std::pair<std::string, Tissue>> keys;
-  for (int t = 0; t < segmentation::tissue_count; ++t)
-    keys.emplace_back(std::string(tissue_names[t]), static_cast<Tissue>(t));
-  keys.emplace_back("support", Tissue::muscle);
-  return keys;
-}
-
-void read_labels(const TomlReader& labels, bool object, std::map<int, Tissue>& result) {
-  std::vector<std::string> keys;
-  for (const auto& [key, tissue] : label_keys()) keys.push_back(key);
-  labels.allow(keys);
-  bool muscle = false, meshed = false;
-  for (const auto& [key, tissue] : label_keys()) {
-    const auto values = labels.integers(key);
-    if (!values) continue;
-    if (values->empty())
-      labels.fail(key, "lists no label value; give the values the volume uses, or leave the key out");
-    muscle |= tissue == Tissue::muscle;
-    meshed |= is_meshed(tissue);
-    for (const int value : *values) {
-      const auto [known, added] = result.emplace(value, tissue);
-      if (!added)
-        labels.fail(key, fmt::format("label value {} is listed already, for {}; each value belongs to one tissue",
-                                     value, tissue_names[static_cast<int>(known->second)]));
-    }
-  }
-  if (!muscle && object)
-    labels.fail("support", "is missing: the label value of the rigid thing that holds the body must be given");
-  if (!muscle) labels.fail("muscle", "is missing: the breast slides on the muscle, so its label value must be given");
-  if (!meshed) labels.fail("adipose", "no soft tissue is listed; give at least adipose or gland");
 }
 
 NamedPlace read_place(const TomlReader& table, const std::string& name, bool support, const std::string& frame) {
@@ -97,22 +61,11 @@ NamedPlace read_place(const TomlReader& table, const std::string& name, bool sup
   return place;
 }
 
-bool is_plain_name(const std::string& name) {
-  return !name.empty() && std::all_of(name.begin(), name.end(),
-                                      [](unsigned char c) { return (c < 128 && std::isalnum(c)) || c == '_'; });
-}
-
 std::vector<NamedPlace> read_named(const TomlReader& image, const char* key, bool support, const std::string& frame) {
   std::vector<NamedPlace> places;
   const auto table = image.sub_table(key);
   if (!table) return places;
-  std::vector<std::pair<toml::source_position, std::string>> names;  // as they stand in the file
-  for (const auto& [name, node] : table->table()) names.emplace_back(name.source().begin, std::string(name.str()));
-  std::sort(names.begin(), names.end(), [](const auto& a, const auto& b) {
-    return std::pair(a.first.line, a.first.column) < std::pair(b.first.line, b.first.column);
-  });
-  for (const auto& [place, name] : names) {
-    if (!is_plain_name(name)) table->fail(name, "a support or part names arrays: use letters, digits and _ only");
+  for (const std::string& name : plain_names(*table)) {
     const auto entry = table->sub_table(name);
     if (!entry) table->fail(name, fmt::format("must be a table: write [image.{}.{}]", key, name));
     places.push_back(read_place(*entry, name, support, frame));
@@ -123,7 +76,8 @@ std::vector<NamedPlace> read_named(const TomlReader& image, const char* key, boo
 void read_places(const TomlReader& image, bool surface, Case& result) {
   for (const char* key : {"supports", "parts"})
     if (!surface && image.has(key))
-      image.fail(key, "belongs to kind = \"surface\"; in a label map supports and parts are labels ([image.labels])");
+      image.fail(key,
+                 "belongs to kind = \"surface\"; in a label map supports are labels ([image.labels] support.NAME)");
   if (!surface) return;
   result.supports = read_named(image, "supports", true, result.frame);
   result.parts = read_named(image, "parts", false, result.frame);
@@ -132,6 +86,22 @@ void read_places(const TomlReader& image, bool surface, Case& result) {
 }
 
 }  // namespace
+
+std::vector<std::string> plain_names(const TomlReader& table) {
+  std::vector<std::pair<toml::source_position, std::string>> names;
+  for (const auto& [name, node] : table.table()) names.emplace_back(name.source().begin, std::string(name.str()));
+  std::sort(names.begin(), names.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.first.line, a.first.column) < std::pair(b.first.line, b.first.column);
+  });
+  std::vector<std::string> result;
+  for (const auto& [place, name] : names) {
+    if (name.empty() || !std::all_of(name.begin(), name.end(),
+                                     [](unsigned char c) { return (c < 128 && std::isalnum(c)) || c == '_'; }))
+      table.fail(name, "a support or part names arrays: use letters, digits and _ only");
+    result.push_back(name);
+  }
+  return result;
+}
 
 fs::path case_path(const TomlReader& reader, std::string_view key, bool folder_allowed) {
   const fs::path path = reader.file().parent_path() / reader.required_text(key);
@@ -180,7 +150,7 @@ void read_case_image(const TomlReader& file, Case& result) {
   const bool needs_labels = result.image_kind == "labels";
   if (needs_labels && !labels)
     image->fail("labels", "table [image.labels] is missing: it says which value is which tissue");
-  if (labels) read_labels(*labels, result.is_object(), result.labels);
+  if (labels) read_case_labels(*labels, result);
 
   const auto recipe = file.sub_table("segmentation");
   if (!recipe) return;

@@ -10,6 +10,10 @@ namespace supine::pipeline {
 /// @throws InputError  naming the key when it is not there
 std::filesystem::path case_path(const TomlReader& reader, std::string_view key, bool folder_allowed);
 
+/// The names of a table's entries in the order of the file: what becomes the name of an array.
+/// @throws InputError  a name of other characters than letters, digits and _
+std::vector<std::string> plain_names(const TomlReader& table);
+
 /// Fills in what the tables [image], [image.labels] and [segmentation] say.
 void read_case_image(const TomlReader& file, Case& result);
 

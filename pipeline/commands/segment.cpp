@@ -51,6 +51,7 @@ struct Findings {
   std::array<segmentation::TissueCounts, 2> sides{};  ///< voxels left and right of the sternum plane, when there is one
   std::vector<segmentation::Doubt> doubts;
   std::vector<float> gland_share;  ///< per voxel; empty when no step found it
+  segmentation::SupportVoxels supports;
   std::string file_frame;
 };
 
@@ -106,6 +107,7 @@ class SegmentTool : public Tool {
     LabelImage labels = make_labels(measured, run, findings);
     run.stage("check");
     check(measured, labels);
+    segmentation::check_supports(findings.supports, labels, measured.image_file.string());
     findings.voxels = segmentation::count_tissues(labels);
     if (!measured.is_object()) check_volume(measured, labels, findings);
     count_sides(labels, findings);
@@ -120,7 +122,7 @@ class SegmentTool : public Tool {
     if (target.extension() != ".vti")
       throw InputError(fmt::format("-o {}: the label file ends in .vti", target.string()));
     run.progress("writing");
-    segmentation::write_labels(labels, run.output(target), notes_of(measured), findings.gland_share);
+    segmentation::write_labels(labels, run.output(target), notes_of(measured), findings.gland_share, findings.supports);
     fill(run.figures(target), measured, labels.grid, findings);
     if (!overlay_folder_.empty()) write_overlays(labels, run);
     say(run, labels.grid, findings, target);
@@ -152,6 +154,7 @@ class SegmentTool : public Tool {
       run.stage("map");
       segmentation::MappedLabels mapped = segmentation::map_labels(volume.image, measured.labels, file);
       for (const auto& warning : mapped.warnings) run.warn(warning);
+      findings.supports = segmentation::mark_supports(volume.image, measured.label_supports);
       return std::move(mapped.image);
     }
     run.stage("recipe");
@@ -270,6 +273,8 @@ class SegmentTool : public Tool {
     if (!findings.gland_share.empty())
       json["gland_by_share_ml"] = std::accumulate(findings.gland_share.begin(), findings.gland_share.end(), 0.0) *
                                   grid.voxel_volume_mm3() / 1000;
+    for (std::size_t s = 0; s < findings.supports.names.size(); ++s)
+      json["supports_ml"][findings.supports.names[s]] = volume_ml(grid, voxels_of(findings.supports, s));
     fill_sides(json, grid, findings);
     if (!findings.dice) return;
     for (int t = 0; t < tissue_count; ++t)
@@ -292,6 +297,9 @@ class SegmentTool : public Tool {
     }
     run.say(fmt::format("{:<10}{:>12}{:>11.1f}{:>8}", "meshed", meshed(findings.voxels),
                         volume_ml(grid, meshed(findings.voxels)), findings.components.meshed));
+    for (std::size_t s = 0; s < findings.supports.names.size(); ++s)
+      run.say(fmt::format("support {:<12}{:>10.1f} ml", findings.supports.names[s],
+                          volume_ml(grid, voxels_of(findings.supports, s))));
     if (!findings.planes.empty())
       run.say(fmt::format("left breast {:.1f} ml (gland {:.1f}), right breast {:.1f} ml (gland {:.1f})",
                           volume_ml(grid, meshed(findings.sides[0])), volume_ml(grid, findings.sides[0][2]),
@@ -337,6 +345,9 @@ class SegmentTool : public Tool {
 
   static double volume_ml(const Grid& grid, std::size_t voxels) {
     return static_cast<double>(voxels) * grid.voxel_volume_mm3() / 1000;
+  }
+  static std::size_t voxels_of(const segmentation::SupportVoxels& supports, std::size_t row) {
+    return static_cast<std::size_t>(std::count(supports.number.begin(), supports.number.end(), row + 1));
   }
   static std::size_t meshed(const segmentation::TissueCounts& voxels) {
     std::size_t sum = 0;

@@ -11,6 +11,7 @@
 #include "meshing/mesh_check.h"
 #include "meshing/mesh_io.h"
 #include "meshing/quality.h"
+#include "meshing/supports.h"
 #include "meshing/tetrahedra/curve.h"
 #include "meshing/tetrahedra/grade.h"
 #include "meshing/tetrahedra/ligament_ring.h"
@@ -21,6 +22,7 @@
 #include "pipeline/picture/picture.h"
 #include "pipeline/results/mesh_report.h"
 #include "pipeline/tool/tool.h"
+#include "reconstruction/regions.h"
 #include "reconstruction/surface_io.h"
 #include "segmentation/formats/labels_io.h"
 
@@ -143,14 +145,18 @@ class TetrahedraliseTool : public Tool {
     auto [mesh, enclosing] = meshing::tetrahedralise(surface, inside, options, surface_);
     mesh.muscle = muscle;
     if (order_ == 2) mesh = meshing::to_quadratic(mesh);
-    bend(run, mesh, findings);
+    segmentation::SupportVoxels supports;
+    if (!body) supports = segmentation::read_label_supports(labels_);
+    // Each support of an object has a distance of its own; one field for all would round the edge where two meet.
+    bend(run, mesh, findings.side != "none" || supports.names.size() < 2, findings);
     run.stage("tissue");
     run.progress("reading tissue fractions from the labels");
     if (body)
       name_places(run, *body, mesh, findings);
     else
       findings.fractions = meshing::assign_tissue(mesh, labels, segmentation::read_gland_share(labels_));
-    if (!body && findings.side == "none") name_one_support(mesh);
+    if (!body) name_supports(mesh, supports, labels.grid, findings.side);
+    measure_supports(mesh, options.edge_mm, findings);
     if (!inside.interfaces.empty()) meshing::impose_interfaces(mesh, enclosing, inside.interfaces);
     run.stage("anatomy");
     run.progress("finding the foot of the mound");
@@ -184,10 +190,29 @@ class TetrahedraliseTool : public Tool {
     }
   }
 
-  /// What a label map calls support or muscle is the one support of an object.
-  static void name_one_support(TetMesh& mesh) {
-    mesh.support_names = {"support"};
-    mesh.muscle_support = Eigen::VectorXi::Zero(mesh.muscle.triangles.rows());
+  /// Supports of a label map. Where it names none, what it calls support or muscle is the one support of an object.
+  static void name_supports(TetMesh& mesh, const segmentation::SupportVoxels& supports, const segmentation::Grid& grid,
+                            const std::string& side) {
+    if (!supports.names.empty()) {
+      meshing::assign_supports(mesh, supports, grid);
+    } else if (side == "none") {
+      mesh.support_names = {"support"};
+      mesh.muscle_support = Eigen::VectorXi::Zero(mesh.muscle.triangles.rows());
+    }
+  }
+
+  void measure_supports(const TetMesh& mesh, double edge_mm, MeshFindings& findings) const {
+    const Eigen::VectorXi of_face = meshing::support_of_faces(mesh);
+    for (std::size_t s = 0; s < mesh.support_names.size(); ++s) {
+      const double mm2 = meshing::support_area(mesh, of_face, static_cast<int>(s)).area_mm2;
+      if (mm2 == 0)
+        throw InputError(fmt::format(
+            "{}: no face of the mesh lies on support '{}': it touches the body on less than {:g} mm2, which "
+            "count as noise of the labels, or than a triangle of the surface takes (edges of {:.1f} mm). "
+            "Label more of it, take a finer surface (supine-decimate --triangles), or leave it out",
+            surface_, mesh.support_names[s], reconstruction::smallest_island_mm2, edge_mm));
+      findings.supports_cm2.emplace_back(mesh.support_names[s], mm2 / 100);
+    }
   }
 
   std::vector<meshing::Interface> read_interfaces(Run& run) const {
@@ -211,7 +236,8 @@ class TetrahedraliseTool : public Tool {
     return meshing::sizes_from_pose(pose, options.cells);
   }
 
-  void bend(Run& run, TetMesh& mesh, MeshFindings& findings) const {
+  /// @param onto_muscle  inner nodes go on to the smooth distance of the sheet
+  void bend(Run& run, TetMesh& mesh, bool onto_muscle, MeshFindings& findings) const {
     if (fine_.empty()) return;
     if (order_ == 1) {
       run.say("linear tetrahedra have straight edges: --fine is not used");
@@ -222,8 +248,9 @@ class TetrahedraliseTool : public Tool {
     const reconstruction::Surface fine = reconstruction::read_surface(run.input(fine_));
     Eigen::Matrix<double, 2, 3> box;
     box << mesh.points.colwise().minCoeff(), mesh.points.colwise().maxCoeff();
-    const meshing::MuscleDistance muscle(mesh.muscle, box);
-    findings.curve = meshing::curve_boundary(mesh, fine, &muscle, curving_);
+    std::optional<meshing::MuscleDistance> muscle;
+    if (onto_muscle) muscle.emplace(mesh.muscle, box);
+    findings.curve = meshing::curve_boundary(mesh, fine, muscle ? &*muscle : nullptr, curving_);
   }
 
   std::string find_side() const {

@@ -130,6 +130,7 @@ void fill(Json& json, const MeshFindings& findings) {
     json["scaled_jacobian_histogram_tenths"] = q.scaled_jacobian;
   }
   for (const auto& [name, ml] : findings.parts_ml) json["parts_ml"][name] = ml;
+  for (const auto& [name, cm2] : findings.supports_cm2) json["supports_cm2"][name] = cm2;
   if (findings.curve) json["curve"] = curve_json(*findings.curve);
   if (findings.anatomy) json["anatomy"] = anatomy_json(*findings.anatomy);
 }
@@ -163,6 +164,7 @@ void say(const MeshFindings& findings, const Run& run) {
                         findings.fractions ? fmt::format("  (voxels {:.1f} ml)", voxels) : ""));
   }
   for (const auto& [name, ml] : findings.parts_ml) run.say(fmt::format("part {:<12}{:>6.1f} ml", name, ml));
+  for (const auto& [name, cm2] : findings.supports_cm2) run.say(fmt::format("support {:<12}{:>6.1f} cm2", name, cm2));
   if (!findings.anatomy) return;
   const meshing::Anatomy& a = *findings.anatomy;
   const auto say = [&run](const meshing::Anatomy& one) {

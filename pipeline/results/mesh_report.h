@@ -24,7 +24,8 @@ struct MeshFindings {
   std::optional<meshing::CurveReport> curve;
   std::optional<meshing::FractionReport> fractions;
   std::optional<meshing::Anatomy> anatomy;
-  std::vector<std::pair<std::string, double>> parts_ml = {};  ///< named parts, by name
+  std::vector<std::pair<std::string, double>> parts_ml = {};      ///< named parts, by name
+  std::vector<std::pair<std::string, double>> supports_cm2 = {};  ///< area of the faces on each named support
 };
 
 /// Figures of mesh.json.

@@ -28,6 +28,8 @@ namespace {
 
 constexpr const char* label_array = "tissue";
 constexpr const char* share_array = "fraction_gland";
+constexpr const char* support_array = "support";
+constexpr const char* support_names = "support_names";
 
 std::optional<std::string> field_string(vtkImageData& image, const char* name) {
   auto* array = vtkStringArray::SafeDownCast(image.GetFieldData()->GetAbstractArray(name));
@@ -35,10 +37,10 @@ std::optional<std::string> field_string(vtkImageData& image, const char* name) {
   return array->GetValue(0);
 }
 
-void add_strings(vtkImageData& image, const char* name, std::initializer_list<std::string_view> values) {
+void add_strings(vtkImageData& image, const char* name, const std::vector<std::string>& values) {
   vtkNew<vtkStringArray> array;
   array->SetName(name);
-  for (const auto value : values) array->InsertNextValue(std::string(value));
+  for (const std::string& value : values) array->InsertNextValue(value);
   image.GetFieldData()->AddArray(array);
 }
 
@@ -144,7 +146,7 @@ RawImage read_vti(const std::filesystem::path& file) {
 }  // namespace formats
 
 void write_labels(const LabelImage& labels, const std::filesystem::path& file, const LabelNotes& notes,
-                  const std::vector<float>& gland_share) {
+                  const std::vector<float>& gland_share, const SupportVoxels& supports) {
   const Grid& grid = labels.grid;
   vtkNew<vtkImageData> data;
   data->SetDimensions(grid.size.x(), grid.size.y(), grid.size.z());
@@ -165,12 +167,17 @@ void write_labels(const LabelImage& labels, const std::filesystem::path& file, c
     share->SetArray(const_cast<float*>(gland_share.data()), static_cast<vtkIdType>(gland_share.size()), 1);
     data->GetPointData()->AddArray(share);
   }
+  vtkNew<vtkUnsignedCharArray> support;
+  if (!supports.names.empty()) {
+    support->SetName(support_array);
+    support->SetArray(const_cast<std::uint8_t*>(supports.number.data()), static_cast<vtkIdType>(supports.number.size()),
+                      1);
+    data->GetPointData()->AddArray(support);
+    add_strings(*data, support_names, supports.names);
+  }
   add_strings(*data, "frame", {"LPS"});
   add_strings(*data, "unit", {"mm"});
-  vtkNew<vtkStringArray> names;
-  names->SetName("tissue_names");
-  for (const auto name : tissue_names) names->InsertNextValue(std::string(name));
-  data->GetFieldData()->AddArray(names);
+  add_strings(*data, "tissue_names", {tissue_names.begin(), tissue_names.end()});
   for (const auto& [key, value] : notes) add_strings(*data, key.c_str(), {value});
   vtkNew<vtkXMLImageDataWriter> writer;
   ErrorCollector errors(*writer);
@@ -213,6 +220,35 @@ std::vector<float> read_gland_share(const std::filesystem::path& file) {
       throw InputError(fmt::format("{}: value {} of array `{}` is no share, 0 to 1; write the file with supine-segment",
                                    file.string(), value, share_array));
   return share;
+}
+
+SupportVoxels read_label_supports(const std::filesystem::path& file) {
+  vtkNew<vtkXMLImageDataReader> reader;
+  update(*reader, file);
+  vtkImageData& data = *reader->GetOutput();
+  SupportVoxels supports;
+  auto* names = vtkStringArray::SafeDownCast(data.GetFieldData()->GetAbstractArray(support_names));
+  if (!names || names->GetNumberOfValues() == 0) return supports;
+  for (vtkIdType n = 0; n < names->GetNumberOfValues(); ++n) supports.names.push_back(names->GetValue(n));
+  auto* array = vtkUnsignedCharArray::SafeDownCast(data.GetPointData()->GetArray(support_array));
+  if (!array || array->GetNumberOfComponents() != 1 || !data.GetPointData()->GetArray(label_array))
+    throw InputError(
+        fmt::format("{}: field data `{}` names {} supports, but there is no point array `{}` of one byte "
+                    "a voxel; write the file with supine-segment",
+                    file.string(), support_names, supports.names.size(), support_array));
+  supports.number.assign(array->GetPointer(0), array->GetPointer(0) + array->GetNumberOfTuples());
+  if (std::all_of(supports.number.begin(), supports.number.end(), [](std::uint8_t number) { return number == 0; }))
+    throw InputError(
+        fmt::format("{}: no voxel of array `{}` belongs to one of the {} supports; write the file with "
+                    "supine-segment",
+                    file.string(), support_array, supports.names.size()));
+  for (const std::uint8_t number : supports.number)
+    if (number > supports.names.size())
+      throw InputError(
+          fmt::format("{}: value {} of array `{}` is no support (0 to {}); write the file with "
+                      "supine-segment",
+                      file.string(), number, support_array, supports.names.size()));
+  return supports;
 }
 
 LabelNotes read_label_notes(const std::filesystem::path& file) {

@@ -103,7 +103,7 @@ void check_exportable(Solver solver, const meshing::TetMesh& mesh, const meshing
     refuse(words, "this mesh: quadratic cells are not written (each program places their points differently)",
            "make the mesh with supine-tetrahedralise --order 1 (make CASE=... ORDER=1)");
   if (!mesh.support_names.empty())
-    refuse(words, "supports with names (an object: springs along and across the normal)",
+    refuse(words, "supports with names (springs along and across the normal)",
            "only a breast on its muscle is written");
   if (model.contact.kind != ContactKind::off)
     refuse(words, "[contact] (skin on skin by smooth surfaces)", "leave the table out of the model");

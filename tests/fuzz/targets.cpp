@@ -45,10 +45,11 @@ Target points(const std::string& name, const std::string& file) {
   return {name, {file}, [file](const fs::path& folder) { warp::PointFile(folder / file, "LPS"); }};
 }
 
-/// A part of a label file is read three times, by three readers.
+/// A part of a label file is read four times, by four readers.
 void read_label_file(const fs::path& folder) {
   segmentation::read_labels(folder / "labels.vti");
   segmentation::read_gland_share(folder / "labels.vti");
+  segmentation::read_label_supports(folder / "labels.vti");
   segmentation::read_label_notes(folder / "labels.vti");
 }
 

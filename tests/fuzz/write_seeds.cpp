@@ -56,7 +56,8 @@ void put_volumes(const fs::path& folder, const fs::path& work) {
   segmentation::LabelImage labels{image.grid, std::vector<std::uint8_t>(image.voxels.size(), 1)};
   labels.voxels[7] = 2;
   segmentation::write_labels(labels, work / "labels.vti", {{"cut", "excluded"}, {"side", "left"}},
-                             std::vector<float>(image.voxels.size(), 0.5f));
+                             std::vector<float>(image.voxels.size(), 0.5f),
+                             {{"clamp", "rest"}, std::vector<std::uint8_t>(image.voxels.size(), 2)});
   take("vti", "labels.vti");
   made::write_vti(work / "grey.vti", image);
   take("vti", "grey.vti");

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <map>
+
 #include "common/error.h"
 #include "meshing/decimate/decimate.h"
 #include "meshing/mesh_io.h"
@@ -11,6 +14,7 @@
 #include "meshing/tetrahedra/tetrahedralise.h"
 #include "meshing/topology.h"
 #include "reconstruction/reconstruct.h"
+#include "segmentation/label_map.h"
 #include "tests/pipeline/temporary_folder.h"
 #include "tests/support/shapes.h"
 
@@ -131,6 +135,52 @@ TEST(Parts, ThatOverlapOrHoldNothingAreRefused) {
   TetMesh again = filled();
   const std::string none = complaint([&] { assign_parts(again, {plane("void", {100, 0, 0}, {1, 0, 0})}); });
   EXPECT_NE(none.find("'void' holds nothing"), std::string::npos) << none;
+}
+
+/// Tetrahedra of the block from a label map of 2 mm: 1 inside, outside what @p outside says; 0 is air, 2 the support
+/// "a", 3 the support "b".
+TetMesh from_voxels(const std::function<int(int i, int j, int k)>& outside) {
+  using segmentation::Tissue;
+  segmentation::GreyImage values;
+  values.grid.size = {36, 16, 16};
+  values.grid.spacing_mm.setConstant(2);
+  values.grid.origin_mm.setConstant(-5);
+  for (int k = -3; k < 13; ++k)
+    for (int j = -3; j < 13; ++j)
+      for (int i = -3; i < 33; ++i) {
+        const bool inside = std::min({i, j, k}) >= 0 && i < 30 && std::max(j, k) < 10;
+        values.voxels.push_back(static_cast<float>(inside ? 1 : outside(i, j, k)));
+      }
+  const std::map<int, Tissue> table = {
+      {0, Tissue::air}, {1, Tissue::adipose}, {2, Tissue::muscle}, {3, Tissue::muscle}};
+  const Surface body = reconstruction::reconstruct(map_labels(values, table, "block").image, {}).breast.surface;
+  const DecimateOptions coarser{.target_triangles = 800, .method = DecimateMethod::triangles};
+  TetMesh mesh = tetrahedralise(decimate(body, coarser).surface, TetrahedraliseOptions{});
+  mesh.muscle = reconstruction::reversed_region(body, Region::inner);
+  assign_supports(mesh, segmentation::mark_supports(values, {{"a", {2}}, {"b", {3}}}), values.grid);
+  return mesh;
+}
+
+/// Every face on a support whose centre is farther than @p band_mm from x = 30 lies on "a" before it, on "b" behind.
+void expect_parted(const TetMesh& mesh, double band_mm, double area_mm2) {
+  ASSERT_EQ(mesh.support_names, (std::vector<std::string>{"a", "b"}));
+  const Eigen::VectorXi support = support_of_faces(mesh);
+  for (Eigen::Index f = 0; f < support.size(); ++f) {
+    const double x = face_point(mesh.points, mesh.faces, f, 1.0 / 3, 1.0 / 3).x();
+    if (support[f] >= 0 && std::abs(x - 30) > band_mm) {
+      EXPECT_EQ(support[f], x < 30 ? 0 : 1) << x;
+    }
+  }
+  for (const int s : {0, 1}) EXPECT_NEAR(support_area(mesh, support, s).area_mm2, area_mm2, 0.1 * area_mm2) << s;
+}
+
+TEST(Supports, OfALabelMapGoToTheFacesNearThem) {
+  expect_parted(from_voxels([](int i, int, int) { return i < 0 ? 2 : i >= 30 ? 3 : 0; }), 0, 400);
+}
+
+TEST(Supports, OfALabelMapThatMeetPartAtTheirBorder) {
+  constexpr double edge_mm = 4;
+  expect_parted(from_voxels([](int i, int, int k) { return k >= 0 ? 0 : i < 15 ? 2 : 3; }), edge_mm, 600);
 }
 
 TEST(Supports, ComeBackFromTheFileWithPartsAndFaces) {

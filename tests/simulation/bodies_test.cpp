@@ -228,5 +228,31 @@ TEST(Supports, SeveralAreHeldEachInItsOwnWay) {
   EXPECT_THROW(Chain(scene.mesh, scene.anatomy, model, poses), InputError);
 }
 
+TEST(Supports, ABreastMayHaveSeveral) {
+  const testing::TestScene& plain = testing::dome_scene();
+  testing::TestScene named = plain;
+  named.mesh.support_names = {"muscle", "port"};
+  named.mesh.muscle_support.resize(named.mesh.muscle.triangles.rows());
+  for (Eigen::Index t = 0; t < named.mesh.muscle_support.size(); ++t)
+    named.mesh.muscle_support[t] = named.mesh.muscle.points(named.mesh.muscle.triangles(t, 0), 0) > 20;
+  const std::vector<PoseLoad> poses = {{"prone", {0, -1, 0}}, {"supine", {0, 1, 0}}};
+  Model model = testing::soft_model();
+  const Points one = solve_chain(plain.mesh, plain.anatomy, model, poses).poses[0].x,
+               two = solve_chain(named.mesh, named.anatomy, model, poses).poses[0].x;
+  EXPECT_LT(largest(one, two), 1e-5) << "all slide as one muscle";
+  model.supports["port"].kind = InterfaceKind::fixed;
+  const Points held = solve_chain(named.mesh, named.anatomy, model, poses).poses[0].x;
+  const Eigen::VectorXi support = meshing::support_of_faces(named.mesh);
+  double on_port = 0, on_muscle = 0;
+  for (Eigen::Index f = 0; f < support.size(); ++f)
+    for (const int node : named.mesh.faces.row(f)) {
+      const double moved = (held.row(node) - named.mesh.points.row(node)).norm();
+      if (support[f] == 1) on_port = std::max(on_port, moved);
+      if (support[f] == 0) on_muscle = std::max(on_muscle, moved);
+    }
+  EXPECT_LT(on_port, 1e-3);
+  EXPECT_GT(on_muscle, 1);
+}
+
 }  // namespace
 }  // namespace supine::simulation

@@ -259,6 +259,33 @@ INSTANTIATE_TEST_SUITE_P(
                 {"[pose.tilt45]", "no surface"}}),
     [](const auto& place) { return place.param.name; });
 
+TEST_F(CaseFile, NamesSupportsOfALabelMap) {
+  EXPECT_TRUE(read(good).label_supports.empty());
+  const Case c = read(replaced(good, "muscle = [40]", "muscle = [40]\nsupport.port = [41, 42]\nsupport.arm = [7]"));
+  EXPECT_EQ(c.labels.at(42), Tissue::muscle);
+  ASSERT_EQ(c.label_supports.size(), 3u);
+  EXPECT_EQ(c.label_supports[0].name, "muscle");
+  EXPECT_EQ(c.label_supports[1].name, "port") << "in the order of the file";
+  EXPECT_EQ(c.label_supports[1].values, (std::vector<int>{41, 42}));
+  EXPECT_EQ(c.label_supports[2].name, "arm");
+  const Case without = read(replaced(good, "muscle = [40]", "support = { port = [40] }"));
+  ASSERT_EQ(without.label_supports.size(), 1u);
+  EXPECT_EQ(without.label_supports[0].name, "port");
+}
+
+TEST_F(CaseFile, RefusesSupportsOfALabelMapThatCannotBeMeant) {
+  const auto said = [&](const std::string& lines) { return complaint("muscle = [40]", lines); };
+  expect_words(said("support.a = [40]\nsupport.a = [41]"), {"case.toml:16", "not valid TOML"});
+  expect_words(said("muscle = [40]\nsupport.muscle = [41]"), {"[image.labels.support] muscle", "second support"});
+  expect_words(said("support.a = [40]\nsupport.b = [41, 40]"), {"b = [41, 40]", "label value 40", "for a"});
+  expect_words(said("support.a = [1]"), {"label value 1", "for adipose"});
+  expect_words(said("support.a = []"), {"[image.labels.support] a", "lists no label value"});
+  expect_words(said("support.\"a b\" = [40]"), {"a b", "letters, digits and _"});
+  const std::string mri = replaced(replaced(good, "kind = \"labels\"", "kind = \"mri\""), "muscle = [40]",
+                                   "muscle = [40]\nsupport.port = [41]");
+  expect_words(input_error([&] { read(mri); }), {"[image.labels] support", "label map"});
+}
+
 const std::string bar = R"([case]
 name = "bar"
 body = "object"

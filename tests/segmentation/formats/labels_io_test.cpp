@@ -55,6 +55,29 @@ TEST(LabelsIo, NotesTravelWithTheLabels) {
   EXPECT_TRUE(read_label_notes(folder / "bare.vti").empty());
 }
 
+TEST(LabelsIo, NamedSupportsTravelWithTheLabels) {
+  const TemporaryFolder folder;
+  const LabelImage labels = some_labels();
+  SupportVoxels supports{{"clamp", "rest"}, std::vector<std::uint8_t>(60, 0)};
+  supports.number[3] = 1;
+  supports.number[59] = 2;
+  write_labels(labels, folder / "named.vti", {}, {}, supports);
+  const SupportVoxels read = read_label_supports(folder / "named.vti");
+  EXPECT_EQ(read.names, supports.names);
+  EXPECT_EQ(read.number, supports.number);
+  EXPECT_EQ(read_labels(folder / "named.vti").voxels, labels.voxels);
+  write_labels(labels, folder / "bare.vti");
+  EXPECT_TRUE(read_label_supports(folder / "bare.vti").names.empty());
+  supports.number.assign(60, 0);
+  write_labels(labels, folder / "nowhere.vti", {}, {}, supports);
+  EXPECT_NE(message_of([&] { read_label_supports(folder / "nowhere.vti"); }).find("no voxel of array `support`"),
+            std::string::npos);
+  supports.number[7] = 3;
+  write_labels(labels, folder / "wrong.vti", {}, {}, supports);
+  EXPECT_NE(message_of([&] { read_label_supports(folder / "wrong.vti"); }).find("value 3 of array `support`"),
+            std::string::npos);
+}
+
 TEST(LabelsIo, TheShareOfGlandTravelsWithTheLabels) {
   const TemporaryFolder folder;
   const LabelImage labels = some_labels();
