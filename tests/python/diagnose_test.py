@@ -12,10 +12,10 @@ class Diagnose(SmallCase):
     def test_a_diagnosis_is_that_of_the_tool(self):
         out = self.folder / "tool"
         model = CASE / "model.toml"
-        self.assertEqual(tool("supine-diagnose", CASE, MESH, "--model", model, "--refit", "1", "--no-other-meshes", "-o",
+        self.assertEqual(tool("supine-diagnose", CASE, MESH, "--model", model, "--refit", "0", "--no-other-meshes", "-o",
                               out)[0], 0)
         with self.assertWarnsRegex(supine.SupineWarning, "the mesh is taken to be exact"):
-            found = supine.diagnose(self.case, self.mesh, self.model, refits=1, other_meshes=False)
+            found = supine.diagnose(self.case, self.mesh, self.model, refits=0, other_meshes=False)
         self.assertEqual(found.figures, figures(out / "diagnosis.json"))
         self.assertEqual(found.verdict, found.figures["verdict"])
         self.assertIn("the mesh is taken to be exact (--no-other-meshes)", found.warnings)
@@ -40,7 +40,7 @@ class Diagnose(SmallCase):
 
         supine.add_effect(Fragile())
         with self.says(LookupError, "of mine"):
-            supine.diagnose(self.case, self.mesh, self.model, refits=1, other_meshes=False)
+            supine.diagnose(self.case, self.mesh, self.model, refits=0, other_meshes=False)
 
 
 if __name__ == "__main__":
