@@ -256,7 +256,16 @@ TEST_F(Calibrate, SensitivityGoesThroughItsDraws) {
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 6);
 }
 
+/// The small case's scan is flatter than tissue of 1.5 kPa can be: a prior that lets the body fit it.
+const std::string soft_text = R"([breast]
+law = "neo_hookean"
+young_modulus_kpa = { value = 0.4, prior_sd = 0.4, lower = 0.1, upper = 20 }
+[skin]
+young_modulus_kpa = { value = 30, prior_sd = 20, lower = 1, upper = 300 }
+)";
+
 TEST_F(Calibrate, DiagnosisAsksTheWholeCatalogue) {
+  write_text(folder() / "model.toml", soft_text);
   ASSERT_LE(run("calibrate", "out", {"--force"}).code, 1);
   const Finished finished = run("diagnose", "out", {"--force", "--refit", "1"});
   ASSERT_EQ(finished.code, 0) << finished.err;
@@ -268,10 +277,11 @@ TEST_F(Calibrate, DiagnosisAsksTheWholeCatalogue) {
   int refitted = 0;
   for (const Json& candidate : result["candidates"]) refitted += !candidate["refit_rms_mm"].is_null();
   EXPECT_GE(refitted, 1);
-  EXPECT_LE(refitted, 2);
+  EXPECT_LE(refitted, 6) << "where lines bend, six times --refit";
 }
 
 TEST_F(Calibrate, MakeGoesFromTheMeshToTheDiagnosisAndRunsNothingTwice) {
+  write_text(folder() / "model.toml", soft_text);
   std::vector<std::string> command = make_command(folder());
   command.insert(command.end(), {"calibrate", "diagnose"});
   const Finished first = run_process(command);
