@@ -6,8 +6,12 @@
 #                                    then calibrate, diagnose, ladder, sensitivity, targets, warp; report: one page of what is there
 #   make COHORT=dir [TARGET=stage] [OUT=dir] [PROFILE=cohort/slurm]
 #                                    the same for every case in the folder; with PROFILE through Snakemake: cohort/README.md
-#   make fuzz [FUZZ_SECONDS=60] [FUZZ_TARGETS="ply vtu"] [FUZZ_SEED=0]
-#                                    every reader of files under libFuzzer, for that long each: tests/fuzz/README.md
+#   make fuzz [FUZZ_SECONDS=60] [FUZZ_INPUTS=0] [FUZZ_TARGETS="ply vtu"] [FUZZ_SEED=0]
+#                                    every reader of files under libFuzzer, for that long or with that many inputs each: tests/fuzz/README.md
+#   make sanitize [SANITIZE="test_meshing test_fuzz"] [SHORT=ON]
+#                                    every test, these, or those that are short, under address and undefined-behaviour sanitizers:
+#                                    tests/sanitizers/README.md
+#   make sanitize-threads            tests of what runs in parallel under the thread sanitizer
 #   make style                       whether every source file is as clang-format 14 writes it; make format writes it
 #   make build                       only build, into $(BUILD); make tools: without tests and measurements
 #   make package                     Debian packages in $(BUILD)/package; make package-test installs and tries them in a bare Debian 12
@@ -30,7 +34,7 @@ run_case = +@$(MAKE) --no-print-directory -f pipeline/Makefile BIN=$(BUILD)/bin
 # Data that the repository does not hold: docs/data.md.
 DATA ?= data
 
-.PHONY: style format bench study hidden demo test fuzz build tools package package-test configure setup clean help case cohort $(stages)
+.PHONY: style format bench study hidden demo test sanitize sanitize-threads fuzz build tools package package-test configure setup clang clean help case cohort $(stages)
 
 ifdef CASE
 case: tools
@@ -87,16 +91,30 @@ package-test: package
 test: build
 	@ctest --test-dir $(BUILD) --output-on-failure --parallel 2
 
-# Clang's own build folder, of which only the fuzzer is built.
-FUZZ_SECONDS ?= 60
-FUZZ_SEED ?= 0
-fuzz: setup
+# Clang's own build folders.
+clang: setup
 	@echo 'extern "C" int LLVMFuzzerTestOneInput(const char*, unsigned long) { return 0; }' | \
 	  clang++ -fsanitize=fuzzer,address -fopenmp -x c++ - -o /dev/null 2>/dev/null || \
-	  { echo "make fuzz needs clang, its runtime and its OpenMP: apt-get install clang libclang-rt-14-dev libomp-dev" >&2; exit 2; }
-	@[ -f build-fuzz/build.ninja ] || cmake --preset fuzz
-	@cmake --build build-fuzz --parallel $(JOBS) --target fuzz_readers write_seeds
-	@tests/fuzz/run.sh build-fuzz $(FUZZ_SECONDS) $(FUZZ_SEED) $(FUZZ_TARGETS)
+	  { echo "sanitizers and fuzzing need clang, its runtime and its OpenMP: apt-get install clang libclang-rt-14-dev libomp-dev" >&2; exit 2; }
+
+build-sanitize/build.ninja build-sanitize-threads/build.ninja: | clang
+	@cmake --preset $(patsubst build-%/,%,$(dir $@)) -DSUPINE_SHARED_DATA=$(abspath $(DATA))
+
+# Executables; none: every test there is.
+sanitized = $(or $(SANITIZE),$(if $(filter sanitize-threads,$@),$(sanitize_threads),$(if $(SHORT),$(sanitize_short))))
+sanitize_short := test_common test_fuzz test_pipeline test_verification test_reconstruction test_calibration test_registration test_segmentation test_meshing test_simulation
+sanitize_threads := test_reconstruction test_registration test_simulation test_segmentation test_meshing test_fitting test_warp test_diagnosis
+sanitize sanitize-threads: %: build-%/build.ninja
+	@source tests/sanitizers/options.sh && cmake --build build-$@ --parallel $(JOBS) --target $(or $(sanitized),tests/all tools)
+	@tests/sanitizers/run.sh build-$@ $(if $(SHORT),--short) $(sanitized)
+
+# Only the fuzzer is built.
+FUZZ_INPUTS ?= 0
+FUZZ_SECONDS ?= $(if $(filter 0,$(FUZZ_INPUTS)),60,0)
+FUZZ_SEED ?= 0
+fuzz: build-sanitize/build.ninja
+	@cmake --build build-sanitize --parallel $(JOBS) --target fuzz_readers write_seeds
+	@tests/fuzz/run.sh build-sanitize $(FUZZ_SECONDS) $(FUZZ_INPUTS) $(FUZZ_SEED) $(FUZZ_TARGETS)
 
 # Version 14, Debian 12's: other versions write other lines.
 clang_format = $(firstword $(shell command -v clang-format-14 clang-format))

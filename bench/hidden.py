@@ -150,10 +150,10 @@ class Rows:
 
 def seed_from(tag):
     """A seed that nobody has chosen: the hash of the commit that the tag stands at."""
-    found = subprocess.run(["git", "-C", HERE, "rev-parse", "--verify", "--quiet", f"refs/tags/{tag}^{{commit}}"],
+    found = subprocess.run(["git", "-C", HERE, "rev-parse", "--verify", "--quiet", f"{tag}^{{commit}}"],
                            capture_output=True, text=True, check=False)
     if found.returncode != 0:
-        raise SystemExit(f"--seed-from {tag}: there is no such tag")
+        raise SystemExit(f"--seed-from {tag}: there is no such tag or commit")
     return int.from_bytes(hashlib.sha256(found.stdout.strip().encode()).digest()[:5], "big")
 
 

@@ -3,7 +3,7 @@
 // Drawn misplacements of a case's scan, registered back: how far from the true place, and whether the stated 95 %
 // region holds it. One line of JSON per draw; bench/registration.py makes the table.
 //
-//   bench_registration CASE SHAPE.vtu DRAWS SEED [TRUTH: shift and turn of the scan as given, mm and rad]
+//   bench_registration CASE SHAPE.vtu DRAWS SEED [TRUTH: shift and turn of the scan as given, mm and rad] [KIND]
 //
 // Kinds: landmarks (to 300 mm, any turn), skin (to 30 mm and 20°), support (the same as landmarks, and the scan sees
 // the bare muscle sheet around the breast: rigid), rigid (the scan sees half as much and four bony points). The share
@@ -107,17 +107,18 @@ Off off(const Points& points, const RigidTransform& found, const RigidTransform&
 }
 
 void print(const std::string& name, const std::string& kind, double share, const registration::Registration& found,
-           const Off& error, double distance, double seconds) {
+           const Off& given, const Off& error, double distance, double seconds) {
   const auto& covariance = found.fit.covariance;
   fmt::print(
-      "{{\"case\":\"{}\",\"kind\":\"{}\",\"share\":{:.3f},\"error_mm\":{:.3f},\"turn_deg\":{:.3f},"
+      "{{\"case\":\"{}\",\"kind\":\"{}\",\"share\":{:.3f},\"given_mm\":{:.3f},\"error_mm\":{:.3f},\"turn_deg\":{:.3f},"
       "\"mahalanobis2\":{:.3f},\"inside\":{},\"sd_mm\":{:.3f},\"sd_deg\":{:.3f},\"before_mm\":{:.2f},"
-      "\"after_mm\":{:.2f},\"overlap\":{:.3f},\"misfit_mm\":{:.2f},\"effective\":{:.1f},\"others\":{},\"seconds\":{:."
-      "2f}}}\n",
-      name, kind, share, error.rms_mm, error.turn_deg, distance, distance <= chi_squared_quantile(6, 0.95),
-      std::sqrt(covariance.topLeftCorner<3, 3>().trace()),
+      "\"after_mm\":{:.2f},\"overlap\":{:.3f},\"misfit_mm\":{:.2f},\"effective\":{:.1f},\"others\":{},"
+      "\"worse_said\":{},\"given_inside\":{},\"seconds\":{:.2f}}}\n",
+      name, kind, share, given.rms_mm, error.rms_mm, error.turn_deg, distance,
+      distance <= chi_squared_quantile(6, 0.95), std::sqrt(covariance.topLeftCorner<3, 3>().trace()),
       std::sqrt(covariance.bottomRightCorner<3, 3>().trace()) * 180 / std::acos(-1.0), found.before_mm, found.after_mm,
-      found.overlap, found.fit.misfit_mm, found.fit.effective_points, found.other_places, seconds);
+      found.overlap, found.fit.misfit_mm, found.fit.effective_points, found.other_places, found.worse_than_given(),
+      found.given_inside, seconds);
   std::fflush(stdout);
 }
 
@@ -151,7 +152,8 @@ void one(const Body& body, const std::string& kind, unsigned seed) {
   try {
     const auto found = registration::register_scan(problem, {}, true, "the scan");
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    print(body.name, kind, share, found, off(problem.points, found.fit.transform, by.inverse()),
+    print(body.name, kind, share, found, off(problem.points, {}, by.inverse()),
+          off(problem.points, found.fit.transform, by.inverse()),
           registration::mahalanobis_squared(found.fit, by.inverse()), took.count());
   } catch (const InputError& error) {
     fmt::print("{{\"case\":\"{}\",\"kind\":\"{}\",\"share\":{:.3f},\"refused\":\"{}\"}}\n", body.name, kind, share,
@@ -166,7 +168,7 @@ int run(int argc, char** argv) {
   const int draws = std::atoi(argv[3]);
   const unsigned seed = static_cast<unsigned>(std::atoi(argv[4]));
   RigidTransform truth;
-  if (argc == 11) {
+  if (argc >= 11) {
     Motion motion;
     for (int k = 0; k < 6; ++k) motion[k] = std::atof(argv[5 + k]);
     truth = registration::turned_about(in.scan.points.colwise().mean(), motion).inverse();
@@ -174,7 +176,9 @@ int run(int argc, char** argv) {
   const meshing::TetMesh& mesh = in.predicted.mesh;
   const Body body{in, {mesh.muscle.points, mesh.muscle.triangles}, truth, description.name};
   const std::string kinds[] = {"landmarks", "skin", "support", "rigid"};
-  for (int draw = 0; draw < draws; ++draw) one(body, kinds[draw % 4], seed + static_cast<unsigned>(draw));
+  const std::string only = argc % 2 == 0 ? argv[argc - 1] : "";
+  for (int draw = 0; draw < draws; ++draw)
+    if (only.empty() || only == kinds[draw % 4]) one(body, kinds[draw % 4], seed + static_cast<unsigned>(draw));
   return 0;
 }
 
@@ -182,8 +186,8 @@ int run(int argc, char** argv) {
 }  // namespace supine
 
 int main(int argc, char** argv) {
-  if (argc != 5 && argc != 11) {
-    fmt::print(stderr, "bench_registration CASE SHAPE.vtu DRAWS SEED [TX TY TZ RX RY RZ]\n");
+  if (argc != 5 && argc != 6 && argc != 11 && argc != 12) {
+    fmt::print(stderr, "bench_registration CASE SHAPE.vtu DRAWS SEED [TX TY TZ RX RY RZ] [KIND]\n");
     return 2;
   }
   try {

@@ -62,6 +62,12 @@ def square(off, covariance):
     return sum(a * b for a, b in zip(off, solve(covariance, off)))
 
 
+def in_region(off, point):
+    """Square of the way to the border of the 95 % ellipsoid, scaled so that the border has QUANTILE_3."""
+    along = [sum(a * b for a, b in zip(axis, off)) / half for axis, half in zip(point["axes"], point["half_axes_mm"])]
+    return QUANTILE_3 * sum(x * x for x in along)
+
+
 def measured_landmarks(case):
     with open(case / f"{POSE}_landmarks.csv", encoding="utf-8") as stream:
         return {row["name"]: [float(row[axis]) for axis in "xyz"] for row in csv.DictReader(stream)}
@@ -75,7 +81,12 @@ def score(case, answer, found):
         if point["name"] in truth:
             off = [a - b for a, b in zip(truth[point["name"]], point["place_mm"])]
             kind = "tumour" if point["name"] == "tumour" else "inside"
-            rows.append((kind, point["name"], math.hypot(*off), point["sigma_mm"], square(off, point["covariance_mm2"])))
+            rows.append((kind, point["name"], math.hypot(*off), point["sigma_mm"], in_region(off, point)))
+            nothing = point.get("if_nothing_missing")
+            if nothing and nothing["half_axes_mm"][0] > 0:
+                off = [a - b for a, b in zip(truth[point["name"]], nothing["place_mm"])]
+                sd = math.sqrt(sum(nothing["covariance_mm2"][k][k] for k in range(3)) / 3)
+                rows.append((kind + ", as if nothing were missing", point["name"], math.hypot(*off), sd, square(off, nothing["covariance_mm2"])))
     expected, places = found["landmarks"], measured_landmarks(case)
     for i, name in enumerate(expected["names"] if expected else []):
         off = [a - b for a, b in zip(places[name], expected["expected_mm"][i])]
@@ -95,7 +106,8 @@ def binomial_bounds(count, share=0.95, outside=0.025):
 
 def table(group, scored):
     print(f"{group}: {len(scored)} cases")
-    for kind in ("tumour", "inside", "landmark"):
+    kinds = ("tumour", "inside", "landmark")
+    for kind in [name for kind in kinds for name in (kind, kind + ", as if nothing were missing")]:
         rows = [row for _, found, _ in scored for row in found if row[0] == kind]
         if not rows:
             continue
@@ -103,7 +115,7 @@ def table(group, scored):
         error = math.sqrt(sum(row[2]**2 for row in rows) / len(rows) / 3)
         sd = math.sqrt(sum(row[3]**2 for row in rows) / len(rows))
         low, high = binomial_bounds(len(rows))
-        print(f"  {kind:<9} {hits:>4} of {len(rows):<4} in the 95 % region ({100 * hits / len(rows):5.1f} %; {low} to {high} if each were by itself), "
+        print(f"  {kind:<36} {hits:>4} of {len(rows):<4} in the 95 % region ({100 * hits / len(rows):5.1f} %; {low} to {high} if each were by itself), "
               f"error {error:.2f} mm per axis, stated {sd:.2f}, square / 3 {sum(row[4] for row in rows) / len(rows) / 3:.2f}")
     p_values = sorted(p for _, _, p in scored if p is not None)
     if p_values:
@@ -135,7 +147,7 @@ def main():
         rows = score(case, answer, found)
         causes = "null" if "null" in case.name or answer.get("causes") == [] or answer.get("effect") == "null" else "with a cause"
         groups.setdefault(causes, []).append((case.name, rows, (found["landmarks"] or {}).get("p_value")))
-        outside = [f"{name} ({math.sqrt(s):.1f})" for _, name, _, _, s in rows if s > QUANTILE_3]
+        outside = [f"{name} ({math.sqrt(s):.1f})" for kind, name, _, _, s in rows if s > QUANTILE_3 and "," not in kind]
         print(f"{case.name:<22} unexplained {found['unexplained_mm']:.2f} mm; outside: {', '.join(outside) or '-'}", flush=True)
     for group, scored in groups.items():
         table(group, scored)

@@ -8,27 +8,13 @@
 #include <limits>
 
 #include "calibration/tissue_range.h"
+#include "calibration/work_limit.h"
 #include "common/error.h"
 
 namespace supine::calibration {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-/// A run that costs more than so many times the dearest that was of use is given up: mostly no equilibrium is near.
-constexpr int cost_share = 3;
-constexpr int least_allowed = 100;  // EquilibriumSolver::work() that any run may take
-
-/// Bounds what a chain may cost for as long as it lives.
-class WorkLimit {
- public:
-  WorkLimit(simulation::Chain& chain, int most) : chain_(chain) { chain.limit_work(most); }
-  ~WorkLimit() { chain_.limit_work({}); }
-  WorkLimit(const WorkLimit&) = delete;
-  WorkLimit& operator=(const WorkLimit&) = delete;
-
- private:
-  simulation::Chain& chain_;
-};
 
 int prior_count(const FreeParameters& parameters, const FitOptions& options) {
   if (!options.use_priors) return 0;
@@ -72,7 +58,7 @@ void ChainCost::warm_start(const Eigen::VectorXd& u, const Prediction& predictio
 std::optional<double> ChainCost::attempt(const Eigen::VectorXd& u) {
   ++log_.evaluations;
   try {
-    const WorkLimit limit(evaluator_.chain(), std::max(least_allowed, cost_share * dearest_));
+    const TrialLimit limit(evaluator_.chain(), dearest_);
     const simulation::ChainSolution near =
         extrapolated(accepted_.prediction.solution, accepted_.linearisation.by_coordinate, u - accepted_.u);
     trial_.prediction = evaluator_.predict(parameters_.model(u), &near);

@@ -3,6 +3,7 @@
 
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/error.h"
@@ -13,6 +14,7 @@ namespace {
 constexpr double usual_sigma_mm = 1.5;
 constexpr double furthest_mm = 60;
 constexpr double spread_factor = 3;
+constexpr double doubtful_factor = 7.0 / 6, explained_share = 0.5, noticed_sigmas = 2;
 constexpr double exchanged_from_mm = 10, exchanged_share = 1.0 / 3;
 
 /// 0 where the file states none.
@@ -65,6 +67,12 @@ void check_names(const MeasuredLandmarks& landmarks, const Points& predicted) {
 
 }  // namespace
 
+double pair_sigma_mm(const Landmarks& imaged, Eigen::Index imaged_row, const Landmarks& measured,
+                     Eigen::Index measured_row) {
+  const double both_mm = std::hypot(stated_mm(imaged, imaged_row), stated_mm(measured, measured_row));
+  return both_mm > 0 ? both_mm : usual_sigma_mm;
+}
+
 MeasuredLandmarks pair_landmarks(const Landmarks& imaged, const Landmarks& measured) {
   const Eigen::Index count = measured.points.rows();
   MeasuredLandmarks pairs{measured.names, Points(count, 3), measured.points, Eigen::VectorXd(count)};
@@ -76,8 +84,7 @@ MeasuredLandmarks pair_landmarks(const Landmarks& imaged, const Landmarks& measu
           fmt::format("landmark '{}' is not among those of [landmarks] prone ({}): it has the same name in every pose",
                       name, fmt::join(imaged.names, ", ")));
     pairs.imaged.row(l) = imaged.points.row(*row);
-    const double both_mm = std::hypot(stated_mm(imaged, *row), stated_mm(measured, l));
-    pairs.sigma_mm[l] = both_mm > 0 ? both_mm : usual_sigma_mm;
+    pairs.sigma_mm[l] = pair_sigma_mm(imaged, *row, measured, l);
   }
   return pairs;
 }
@@ -95,6 +102,23 @@ void check_landmarks(const MeasuredLandmarks& landmarks, const Points& predicted
       "{}Check its unit, its frame and its name; where the model is that far off, calibrate it by the surface alone",
       landmarks.names[static_cast<std::size_t>(worst)], measured(worst, 0), measured(worst, 1), measured(worst, 2),
       distance, furthest_mm, reading(measured, predicted)));
+}
+
+std::string doubt_of_scale(const MeasuredLandmarks& landmarks, const Points& predicted) {
+  if (predicted.rows() < 3) return {};
+  const auto about_mean = [](const Points& points) -> Points { return points.rowwise() - points.colwise().mean(); };
+  const Points here = about_mean(landmarks.measured), there = about_mean(predicted);
+  const double factor = here.cwiseProduct(there).sum() / there.squaredNorm();
+  if (!(factor > 0) || std::max(factor, 1 / factor) < doubtful_factor) return {};
+  const auto rms = [&here](const Points& places) {
+    return (here - places).norm() / std::sqrt(static_cast<double>(here.rows()));
+  };
+  const double off = rms(there), rest = rms(factor * there);
+  if (off < noticed_sigmas * landmarks.sigma_mm.mean() || rest > explained_share * off) return {};
+  return fmt::format(
+      "its {} landmarks are spread {:.2f} times as far as the model has them ({:.1f} mm off about their mean, RMS; "
+      "{:.1f} mm without that factor): check their unit and scale; if they are right, the model is far from this body",
+      landmarks.names.size(), factor, off, rest);
 }
 
 }  // namespace supine::calibration

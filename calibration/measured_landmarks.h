@@ -15,8 +15,12 @@ struct MeasuredLandmarks {
   Eigen::VectorXd sigma_mm;  ///< #L, of both places together, 1 sigma along each axis, > 0
 };
 
-/// Landmarks of a pose with their places in the image, in the order of @p measured. Variances that the two state add
-/// up; 1.5 mm where neither states one.
+/// 1 sigma of a landmark's two places together, mm: variances that the two files state add up; 1.5 where neither states
+/// one.
+double pair_sigma_mm(const Landmarks& imaged, Eigen::Index imaged_row, const Landmarks& measured,
+                     Eigen::Index measured_row);
+
+/// Landmarks of a pose with their places in the image, in the order of @p measured, known to pair_sigma_mm().
 /// @throws InputError  a measured name that the image does not have
 MeasuredLandmarks pair_landmarks(const Landmarks& imaged, const Landmarks& measured);
 
@@ -27,5 +31,10 @@ MeasuredLandmarks pair_landmarks(const Landmarks& imaged, const Landmarks& measu
 /// @throws InputError  naming the landmark, the distance, the bound, and metres or a RAS file where that would explain
 /// it
 void check_landmarks(const MeasuredLandmarks& landmarks, const Points& predicted);
+
+/// What to doubt of landmarks that may be right: spread otherwise by a sixth or more than the model has them, where
+/// that alone explains half of what is off (more than 2 sigma, RMS). Empty: nothing.
+/// @param predicted  as above
+std::string doubt_of_scale(const MeasuredLandmarks& landmarks, const Points& predicted);
 
 }  // namespace supine::calibration

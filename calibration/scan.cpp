@@ -142,10 +142,11 @@ void check_frame(const Scan& scan, const ModelSkin& model, const reconstruction:
   const double negated = median_distance_mm(scan, model, true);
   if (negated * (behind > most_behind ? flip_gain_from_behind : flip_gain) < as_is) {
     throw InputError(fmt::format(
-        "{}: lies {:.1f} mm from the model's skin (median), {:.0f} % of it behind the muscle; with x and y negated it "
+        "{}: lies {:.1f} mm from the model's skin (median){}; with x and y negated it "
         "lies {:.1f} mm from it. Its coordinates are RAS: negate x and y, or name the frame in the file (PLY, OBJ: a "
         "comment line \"frame RAS, unit mm\")",
-        name, as_is, 100 * behind, negated));
+        name, as_is, muscle.triangles.rows() > 0 ? fmt::format(", {:.0f} % of it behind the muscle", 100 * behind) : "",
+        negated));
   }
 }
 

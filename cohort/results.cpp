@@ -203,6 +203,12 @@ Json number_at(const Json& from, const std::string& pointer) {
 /// Columns of the table: name, and what stands there for a case.
 using Row = std::map<std::string, Json>;
 
+void check_interval(const CaseResults& one, const std::string& name, const Json& interval) {
+  if (interval.at(0) <= interval.at(1)) return;
+  throw InputError(fmt::format("{}: the interval of {} is {}, its lower end above the upper; calibrate again",
+                               (one.out / "calibration.json").string(), name, interval.dump()));
+}
+
 Row row_of(const CaseResults& one) {
   Row row;
   row["patient"] = one.name;
@@ -221,6 +227,7 @@ Row row_of(const CaseResults& one) {
   for (const Json& p :
        one.calibration.is_object() ? one.calibration.value("parameters", Json::array()) : Json::array()) {
     const std::string name = p.at("name");
+    check_interval(one, name, p.at("interval95"));
     row[name] = p.at("value"), row[name + " low"] = p.at("interval95").at(0),
     row[name + " high"] = p.at("interval95").at(1);
   }
@@ -229,6 +236,19 @@ Row row_of(const CaseResults& one) {
   for (const Json& a : one.comparison.is_object() ? one.comparison.value("areas", Json::array()) : Json::array())
     row["mean_signed_mm " + a.at("name").get<std::string>()] = a.at("mean_signed_mm");
   return row;
+}
+
+/// A folder that was copied would count its patient twice.
+void check_no_copy(const std::vector<CaseResults>& cases, const char* file, const Json CaseResults::*result) {
+  std::map<std::string, const CaseResults*> known;
+  for (const CaseResults& one : cases) {
+    if (!(one.*result).is_object()) continue;
+    const auto [other, is_new] = known.emplace((one.*result).dump(), &one);
+    if (!is_new)
+      throw InputError(
+          fmt::format("{} and {} are the same: a patient would count twice; take one of the two folders away",
+                      (other->second->out / file).string(), (one.out / file).string()));
+  }
 }
 
 }  // namespace
@@ -251,6 +271,8 @@ std::vector<CaseResults> read_results(const fs::path& cohort, const fs::path& ou
     cases.push_back(std::move(one));
   }
   std::sort(cases.begin(), cases.end(), [](const CaseResults& a, const CaseResults& b) { return a.name < b.name; });
+  check_no_copy(cases, "calibration.json", &CaseResults::calibration);
+  check_no_copy(cases, "diagnosis.json", &CaseResults::diagnosis);
   if (cases.empty())
     throw InputError(fmt::format("{} holds no case: none of its folders has a case.toml", cohort.string()));
   if (!any)

@@ -18,7 +18,8 @@ struct CaseResults {
 
 /// The folders of @p cohort that hold a case.toml, by name, with their results in FOLDER/out, or in OUT/NAME where @p
 /// out is given.
-/// @throws InputError  no such folder; no case in it; no case with a result; a result that is no JSON
+/// @throws InputError  no such folder; no case in it; no case with a result; a result that is no JSON;
+/// two cases with the same calibration or diagnosis
 std::vector<CaseResults> read_results(const std::filesystem::path& cohort, const std::filesystem::path& out);
 
 /// Tables and pooled evidence of a cohort (docs/supine-cohort.md).

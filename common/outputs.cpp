@@ -87,6 +87,10 @@ std::filesystem::path Outputs::stage(const std::filesystem::path& target) {
   if (!fs::is_directory(folder))
     throw InputError("output folder " + folder.string() + " cannot be created" +
                      (failed ? ": " + failed.message() : std::string()) + "; choose another with -o");
+  // A rename would put a plain file in the place of a device: of /dev/null, for the whole machine.
+  if (fs::exists(target) && !fs::is_regular_file(target))
+    throw InputError("output file " + target.string() + " is a folder, device or pipe, which no file may replace; " +
+                     "choose another with -o");
   if (fs::exists(target) && !force_)
     throw InputError("output file " + target.string() + " exists; add --force to replace it or choose another with -o");
 

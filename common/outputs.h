@@ -22,7 +22,8 @@ class Outputs {
 
   /// Announces the file @p target and returns the temporary path to write to (same extension,
   /// because writers choose their format by it). Missing parent folders are created.
-  /// @throws InputError  when the folder is not writable, or the file exists and force is off
+  /// @throws InputError  when the folder is not writable, the target is a folder, device or pipe, or the file exists
+  /// and force is off
   std::filesystem::path stage(const std::filesystem::path& target);
 
   /// Renames every staged file to its target.

@@ -11,6 +11,7 @@
 #include <csignal>
 #include <fstream>
 #include <new>
+#include <stdexcept>
 
 #include "common/error.h"
 
@@ -19,7 +20,7 @@ namespace {
 
 constexpr unsigned longest_s = 300;
 
-constexpr int asked_too_much = 3;
+constexpr int asked_too_much = 3, threw = 4;
 
 /// Room for what a file of that size may hold, compressed many times over: a damaged count asks for far more.
 rlimit room_for(const std::filesystem::path& file) {
@@ -46,10 +47,14 @@ rlimit room_for(const std::filesystem::path& file) {
   alarm(longest_s);
   try {
     read();
+  } catch (const InputError&) {
+    // an answer, which whoever reads again meets
   } catch (const std::bad_alloc&) {
     _exit(asked_too_much);
-  } catch (...) {
-    // an answer too
+  } catch (const std::length_error&) {  // a container that no memory could hold
+    _exit(asked_too_much);
+  } catch (...) {  // a library that trusted the file
+    _exit(threw);
   }
   _exit(0);  // what the parent has open and buffered is the parent's
 }

@@ -7,21 +7,10 @@
 namespace supine {
 
 /// Does @p read in a process of its own, whose output nobody hears, to see whether it comes to its end: readers of
-/// libraries may be brought down by a damaged file. What it throws is no harm; whoever reads again meets it.
+/// libraries may be brought down by a damaged file. An InputError is no harm: whoever reads again meets it.
 /// @param file  for the message
-/// @throws InputError  the reader crashed or ended the process, asked for more than 4 GB and a hundred times the file's
-/// size, or did not end
-///   in 300 s
+/// @throws InputError  the reader crashed, ended the process, threw anything else, asked for more than 4 GB and a
+///   hundred times the file's size, or did not end in 300 s
 void check_survivable(const std::filesystem::path& file, const std::function<void()>& read);
-
-/// The same with a reader of VTK for one file.
-template <class Reader>
-void check_survivable_by(const std::filesystem::path& file) {
-  check_survivable(file, [&file] {
-    Reader* reader = Reader::New();  // goes with the process
-    reader->SetFileName(file.c_str());
-    reader->Update();
-  });
-}
 
 }  // namespace supine

@@ -26,27 +26,38 @@ double typical_size(const Parameter& row) {
 
 }  // namespace
 
+std::vector<Candidate> lacking_effects(const simulation::Model& model, const meshing::TetMesh& mesh,
+                                       const meshing::Anatomy& anatomy) {
+  std::vector<Candidate> all;
+  for (const Effect* effect : simulation::catalogue()) {
+    if (has(model, *effect) || !effect->belongs_to(mesh, anatomy, model)) continue;
+    Candidate candidate{effect->name(), {}, {}, {}};
+    for (const Parameter& row : effect->parameters())
+      if (!row.shape)
+        candidate.parameters.push_back({simulation::parameter_name(*effect, row), row.unit, row.null, row.lower,
+                                        row.upper, typical_size(row), row.one_sided});
+    all.push_back(std::move(candidate));
+  }
+  return all;
+}
+
 std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const simulation::Model& model,
                                        const calibration::Fit& fit, std::vector<std::string>& unseen) {
   const simulation::Sensitivities sensitivities(evaluator.chain(), model, fit.prediction.solution);
   std::vector<Candidate> candidates;
-  for (const Effect* effect : simulation::catalogue()) {
-    if (has(model, *effect) || !effect->belongs_to(*evaluator.scene().mesh, *evaluator.scene().anatomy)) continue;
-    Candidate candidate{effect->name(), {}, Eigen::MatrixXd(fit.residuals.size(), 0), {}};
-    for (const Parameter& row : effect->parameters()) {
-      if (row.shape) continue;
-      const std::string name = simulation::parameter_name(*effect, row);
-      const Eigen::VectorXd slope =
-          calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, name, sensitivities.of(name));
+  for (const Candidate& lacking : lacking_effects(model, *evaluator.scene().mesh, *evaluator.scene().anatomy)) {
+    Candidate candidate{lacking.effect, {}, Eigen::MatrixXd(fit.residuals.size(), 0), {}};
+    for (const CandidateParameter& number : lacking.parameters) {
+      const Eigen::VectorXd slope = calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, number.name,
+                                                          sensitivities.of(number.name));
       const double rms = slope.norm() / std::sqrt(static_cast<double>(slope.size()));
-      if (!(rms * typical_size(row) > unfelt_mm)) continue;
-      candidate.parameters.push_back(
-          {name, row.unit, row.null, row.lower, row.upper, typical_size(row), row.one_sided});
+      if (!(rms * number.typical > unfelt_mm)) continue;
+      candidate.parameters.push_back(number);
       candidate.slope.conservativeResize(Eigen::NoChange, candidate.slope.cols() + 1);
       candidate.slope.col(candidate.slope.cols() - 1) = slope;
     }
     if (candidate.parameters.empty())
-      unseen.push_back(effect->name());
+      unseen.push_back(lacking.effect);
     else
       candidates.push_back(std::move(candidate));
   }

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "calibration/least_squares.h"
+#include "diagnosis/stand_in.h"
 
 namespace supine::diagnosis {
 
@@ -24,7 +26,15 @@ struct Candidate {
   std::vector<CandidateParameter> parameters;
   Eigen::MatrixXd slope;     ///< ∂d/∂(parameter) at its null, #R by #parameters, mm per unit; through both solves
   Eigen::VectorXd secant{};  ///< change of the distances at the usual size, #R; empty where it was not solved
+  double secant_to = 0;      ///< offset of its number from the null at which the secant was taken; 0: there is none
+  std::shared_ptr<const simulation::ChainSolution> secant_at{};  ///< the chain there, where it was kept
+  std::shared_ptr<const StandIn> stand_in{};                     ///< where straight lines promise too much of it
 };
+
+/// Every effect of the catalogue that the body can have and the model has not, with all its numbers but those of place
+/// and shape (Parameter::shape), which change nothing at the null. Without slopes.
+std::vector<Candidate> lacking_effects(const simulation::Model& model, const meshing::TetMesh& mesh,
+                                       const meshing::Anatomy& anatomy);
 
 /// Every effect of the catalogue that is not in the model and that the fitted points can feel. Parameters that change
 /// nothing at the null are left out: place and shape (Parameter::shape), and what these points do not feel.

@@ -7,12 +7,13 @@
 #include <algorithm>
 #include <set>
 
+#include "diagnosis/score_test.h"
 #include "simulation/catalogue.h"
 
 namespace supine::diagnosis {
 namespace {
 
-constexpr double factor_worth_naming = 3, held_by_the_set = 0.95;
+constexpr double held_by_the_set = 0.95;
 constexpr double nothing_unlikely = 0.5, nothing_excluded = 0.25, speaks_against = -3;
 constexpr std::size_t most_named = 6;
 
@@ -84,7 +85,8 @@ std::vector<Inclusion> inclusions(const std::vector<Hypothesis>& hypotheses, con
 }
 
 Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& effects,
-                 const std::vector<Inclusion>& included, const Unexplained& unexplained, const Priors& priors) {
+                 const std::vector<Inclusion>& included, const Unexplained& unexplained, const Priors& priors,
+                 const std::vector<std::string>& unseen) {
   Diagnosis result;
   const double nothing = probability_of_nothing(hypotheses);
   std::vector<std::string> denied;
@@ -95,8 +97,7 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
   if (!result.missing.empty()) {
     result.verdict = Verdict::missing;
     result.ambiguous_rest = likely_effects(hypotheses, effects, included, [&](const Inclusion& one) {
-      return one.probability < priors.named_at &&
-             (one.bayes_factor >= factor_worth_naming || is_left_open(priors, one));
+      return one.probability < priors.named_at && (one.bayes_factor >= settling_factor || is_left_open(priors, one));
     });
     result.why = fmt::format("probability {:.2f} or more", priors.named_at);
     return result;
@@ -104,18 +105,24 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
   const bool some = !included.empty() && included.front().probability > 0 &&
                     std::any_of(included.begin(), included.end(), [&](const Inclusion& one) {
                       const bool likelier_than_nothing = priors.is_expected(one.effect) && one.probability > nothing;
-                      return one.bayes_factor >= factor_worth_naming || likelier_than_nothing;
+                      return one.bayes_factor >= settling_factor || likelier_than_nothing;
                     });
-  if ((some && nothing < nothing_unlikely) || nothing < nothing_excluded) {
+  std::vector<std::string> undecided;
+  for (const Inclusion& one : included)
+    if (is_left_open(priors, one) && std::find(unseen.begin(), unseen.end(), one.effect) != unseen.end())
+      undecided.push_back(one.effect);
+  const bool likely = (some && nothing < nothing_unlikely) || nothing < nothing_excluded;
+  if (likely || !undecided.empty()) {
     result.verdict = Verdict::ambiguous;
     const bool expected =
         std::any_of(included.begin(), included.end(), [&](const Inclusion& one) { return is_left_open(priors, one); });
     result.missing = likely_effects(hypotheses, effects, included, [&](const Inclusion& one) {
-      return (!some && !expected) || one.bayes_factor >= factor_worth_naming || is_left_open(priors, one);
+      return (!some && !expected) || one.bayes_factor >= settling_factor || is_left_open(priors, one);
     });
     if (result.missing.empty() && !included.empty()) result.missing = {included.front().effect};
     result.why = denied.empty() ? fmt::format("that nothing is missing has probability {:.2f}", nothing)
                                 : fmt::format("what was left out speaks against {}", fmt::join(denied, ", "));
+    if (!likely) result.why += fmt::format(", and this scan could not show {}", fmt::join(undecided, " or "));
     return result;
   }
   if (unexplained.low_mm > priors.unexplained_bound_mm) {
@@ -125,6 +132,8 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
                              unexplained.mean_mm, unexplained.low_mm, unexplained.high_mm);
     return result;
   }
+  result.ambiguous_rest =
+      likely_effects(hypotheses, effects, included, [&](const Inclusion& one) { return is_left_open(priors, one); });
   result.why = fmt::format("probability {:.2f}", nothing);
   return result;
 }

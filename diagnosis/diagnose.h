@@ -40,12 +40,14 @@ std::vector<Inclusion> inclusions(const std::vector<Hypothesis>& hypotheses, con
 ///   missing          some effect has a probability of priors.named_at or more, and what was left out does not speak
 ///                    against it by 3 or more
 ///   ambiguous        "nothing" has less than 0.5 and some Bayes factor is 3 or more or an expected effect is likelier
-///                    than nothing, or "nothing" has less than 0.25; an expected effect that is neither found nor
-///                    excluded is named with the others
+///                    than nothing, or "nothing" has less than 0.25, or an expected effect is neither found nor
+///                    excluded and cannot be seen; expected effects that are neither are named with the others
 ///   unexplained      the lower end of what is unexplained is above priors.unexplained_bound_mm
 ///   nothing_missing  otherwise
 /// @param included  of these hypotheses, most probable first
+/// @param unseen    effects that the scan could not show if they were there (not_seen() of the score test)
 Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& effects,
-                 const std::vector<Inclusion>& included, const Unexplained& unexplained, const Priors& priors);
+                 const std::vector<Inclusion>& included, const Unexplained& unexplained, const Priors& priors,
+                 const std::vector<std::string>& unseen);
 
 }  // namespace supine::diagnosis

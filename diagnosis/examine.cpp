@@ -11,6 +11,7 @@
 #include "common/statistics.h"
 #include "diagnosis/evidence/left_out.h"
 #include "diagnosis/follow.h"
+#include "diagnosis/stand_in.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -156,6 +157,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   found->candidates = find_candidates(evaluator, found->base.model, fit, found->unseen);
   tell(options, "effects at their usual size");
   find_secants(subject.scene, found->base, found->base, found->candidates);
+  find_stand_ins(subject.scene, found->base, *found->errors, options.priors, found->candidates);
   found->table = score_candidates(fit.residuals, found->errors->metric().mean_mm, fit.linearisation.slope,
                                   found->candidates, found->errors->whitening(), options.seed);
   tell(options, "evidence");
@@ -167,9 +169,10 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   find_unexplained(options.seed, *found);
   found->places = find_places(subject, *found);
   found->budget = error_budget(*found);
-  found->diagnosis = decide(found->hypotheses, found->effects(), found->included, found->unexplained, options.priors);
+  found->diagnosis = decide(found->hypotheses, found->effects(), found->included, found->unexplained, options.priors,
+                            unsettled(found->table));
   found->under_other_priors = under_other_priors(found->base, found->hypotheses, found->effects(), found->included,
-                                                 found->unexplained, options.priors);
+                                                 found->unexplained, options.priors, unsettled(found->table));
   if (found->diagnosis.verdict == Verdict::unexplained) {
     tell(options, "map of missing forces");
     const FitErrors known(found->base, found->base.nuisances, 0);

@@ -101,7 +101,7 @@ class Follower {
     if (refit.solved) {
       const double promised = h.screened;
       h = refit.hypothesis;
-      bent_ = bent_ || std::abs(promised - h.ln_evidence) > lines_bend_at;
+      bent_ = bent_ || promised - h.ln_evidence > lines_bend_at;
     } else {
       h.unsolved = true;
     }

@@ -18,24 +18,26 @@
 namespace supine::diagnosis {
 namespace {
 
-constexpr double seen_power = 0.5, factor_that_settles = 3;
+constexpr double seen_power = 0.5;
+constexpr double as_good_as = 0.05;  // of the power: what asks for less comes first
 
 /// A measurement that could be made: where "down" points. The fitted pose again needs no solve.
 struct Option {
   std::string name;
   Eigen::Vector3d down;
   bool again = false;
-  std::string area = {};  ///< of the skin that is measured; empty: all of it
+  std::string area = {};  ///< of the skin that is measured beside what was; empty: all of the skin
 };
 
-/// Of an object: skin that the scan did not see, in the pose it was seen in, or the body turned round.
+/// Of an object: skin that the scan did not see, in the pose it was seen in and in one scan with what it saw, or the
+/// body turned round; what asks for less before what asks for more.
 std::vector<Option> options_of_object(const Subject& subject) {
   const simulation::PoseLoad& pose = subject.scene.measurements[0]->pose;
-  std::vector<Option> options = {{pose.name + ", once more", pose.gravity, true},
-                                 {pose.name + ", all of the skin", pose.gravity}};
+  std::vector<Option> options = {{pose.name + ", once more", pose.gravity, true}};
   for (const std::string& area : subject.scene.anatomy->all_area_names())
-    options.push_back({pose.name + ", the skin " + (area == "near the support" ? area : "of the " + area), pose.gravity,
-                       false, area});
+    options.push_back({pose.name + ", with the skin " + (area == "near the support" ? area : "of the " + area),
+                       pose.gravity, false, area});
+  options.push_back({pose.name + ", all of the skin", pose.gravity});
   options.push_back({"turned upside down", -pose.gravity});
   const Eigen::Vector3d side = pose.gravity.cross(subject.scene.anatomy->lateral);
   if (side.norm() > 0.1) options.push_back({"turned on its side", side.normalized()});
@@ -54,16 +56,35 @@ std::vector<Option> options_of(const Subject& subject) {
   return options;
 }
 
-/// Whitened slopes of what is free in the base model and of some effects, at one measurement.
+/// Whitened slopes of what is free in the base model and of some effects, at one measurement, and what the effects'
+/// stand-ins leave there; empty where an effect has none.
 struct Slopes {
   Eigen::MatrixXd base;
   std::vector<Eigen::MatrixXd> effect;
+  std::vector<Eigen::VectorXd> left;
 };
 
 Slopes present(const Findings& found, const std::vector<const Candidate*>& effects) {
-  Slopes slopes{found.errors->whitening().apply(found.base.fit.linearisation.slope), {}};
-  for (const Candidate* effect : effects) slopes.effect.push_back(found.errors->whitening().apply(effect->slope));
+  const Whitening& white = found.errors->whitening();
+  Slopes slopes{white.apply(found.base.fit.linearisation.slope), {}, {}};
+  for (const Candidate* effect : effects) {
+    slopes.effect.push_back(white.apply(effect->slope));
+    slopes.left.push_back(effect->stand_in ? Eigen::VectorXd(white.apply(effect->stand_in->left_mm))
+                                           : Eigen::VectorXd());
+  }
   return slopes;
+}
+
+/// Nodes of a skin that the scan of the first pose saw: the nearest of each of its points.
+std::vector<bool> seen_nodes(const Points& nodes, const calibration::Residuals& residuals) {
+  std::vector<bool> seen(static_cast<std::size_t>(nodes.rows()));
+  for (Eigen::Index r = 0; r < residuals.skin_rows(); ++r) {
+    if (residuals.pose[r] != 0) continue;
+    Eigen::Index nearest;
+    (nodes.rowwise() - residuals.on_skin.row(r)).rowwise().squaredNorm().minCoeff(&nearest);
+    seen[static_cast<std::size_t>(nearest)] = true;
+  }
+  return seen;
 }
 
 /// The skin of a pose as its scan would see it.
@@ -78,15 +99,7 @@ class Pose {
     near.poses[0].name = option.name;
     solution_ = chain_.solve(found.base.model, &near);
     sensitivities_ = std::make_unique<simulation::Sensitivities>(chain_, found.base.model, solution_);
-    const calibration::ModelSkin skin(*subject.scene.mesh, solution_.poses[0].x);
-    std::vector<int> seen;
-    for (std::size_t i = 0; i < skin.nodes().size(); ++i)
-      if (option.area.empty() || subject.scene.anatomy->area_name_of(skin.nodes()[i]) == option.area) {
-        nodes_.push_back(skin.nodes()[i]);
-        seen.push_back(static_cast<int>(i));
-      }
-    place_ = skin.node_points()(seen, Eigen::all);
-    normal_ = skin.node_normals()(seen, Eigen::all);
+    find_nodes(subject, option.area);
     factorise();
   }
 
@@ -104,7 +117,33 @@ class Pose {
     return moved.cwiseProduct(normal_).rowwise().sum();
   }
 
+  /// What the stand-in of an effect does otherwise than the base model.
+  Eigen::VectorXd left_by(const Subject& subject, const StandIn& stand_in) const {
+    simulation::Chain chain(*subject.scene.mesh, *subject.scene.anatomy, stand_in.model, {subject.scene.prone, load_});
+    simulation::ChainSolution near = stand_in.solution;
+    near.poses.resize(1);
+    near.poses[0].name = load_.name;
+    const simulation::ChainSolution solution = chain.solve(stand_in.model, &near);
+    const Points apart = solution.poses[0].x - solution_.poses[0].x;
+    return -apart(nodes_, Eigen::all).cwiseProduct(normal_).rowwise().sum();
+  }
+
  private:
+  /// All of the skin, or what was seen and an area.
+  void find_nodes(const Subject& subject, const std::string& area) {
+    const calibration::ModelSkin skin(*subject.scene.mesh, solution_.poses[0].x);
+    std::vector<bool> chosen(skin.nodes().size(), area.empty());
+    if (!area.empty()) chosen = seen_nodes(skin.node_points(), found_.base.fit.residuals);
+    std::vector<int> rows;
+    for (std::size_t i = 0; i < chosen.size(); ++i)
+      if (chosen[i] || subject.scene.anatomy->area_name_of(skin.nodes()[i]) == area) {
+        nodes_.push_back(skin.nodes()[i]);
+        rows.push_back(static_cast<int>(i));
+      }
+    place_ = skin.node_points()(rows, Eigen::all);
+    normal_ = skin.node_normals()(rows, Eigen::all);
+  }
+
   /// Noise of as many points per node as the fitted scan has, what the mesh does, and the scan's own place.
   void factorise() {
     const Eigen::Index n = place_.rows();
@@ -145,7 +184,7 @@ Slopes further(const Subject& subject, const Findings& found, const Option& opti
   const calibration::FreeParameters& parameters = *found.base.parameters;
   const Eigen::VectorXd unit = parameters.slope(found.base.fit.u);
   const auto rows = pose.points();
-  Slopes slopes{Eigen::MatrixXd(rows, parameters.size()), {}};
+  Slopes slopes{Eigen::MatrixXd(rows, parameters.size()), {}, {}};
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
     slopes.base.col(i) = unit[i] * pose.slope(parameters.names()[static_cast<std::size_t>(i)]);
   slopes.base = pose.white(slopes.base);
@@ -154,6 +193,8 @@ Slopes further(const Subject& subject, const Findings& found, const Option& opti
     for (std::size_t k = 0; k < effect->parameters.size(); ++k)
       columns.col(static_cast<Eigen::Index>(k)) = pose.slope(effect->parameters[k].name);
     slopes.effect.push_back(pose.white(columns));
+    slopes.left.push_back(effect->stand_in ? Eigen::VectorXd(pose.white(pose.left_by(subject, *effect->stand_in)))
+                                           : Eigen::VectorXd());
   }
   return slopes;
 }
@@ -192,6 +233,13 @@ Eigen::VectorXd size_of(const Findings& found, const Candidate& effect) {
   return size;
 }
 
+/// Whether another effect was free to make up for this one.
+bool made_up_by(const Candidate& effect, const std::string& other) {
+  return effect.stand_in &&
+         std::any_of(effect.stand_in->made_up.begin(), effect.stand_in->made_up.end(),
+                     [&other](const MadeUp& number) { return number.name.starts_with(other + "."); });
+}
+
 void rate_pairs(const Findings& found, const std::vector<const Candidate*>& effects, std::size_t in_set,
                 const Slopes& now, const Slopes& then, Separation& result) {
   result.separation = std::numeric_limits<double>::infinity();
@@ -202,7 +250,10 @@ void rate_pairs(const Findings& found, const std::vector<const Candidate*>& effe
       const bool moves = simulation::traits_of(effects[i]->effect).moves_scan;
       const Eigen::VectorXd size = size_of(found, *effects[i]);
       Eigen::VectorXd signal(base.rows());
-      signal << now.effect[i] * size, (moves ? 0.0 : 1.0) * (then.effect[i] * size);
+      if (made_up_by(*effects[i], effects[j]->effect))
+        signal << now.left[i], then.left[i];
+      else
+        signal << now.effect[i] * size, (moves ? 0.0 : 1.0) * (then.effect[i] * size);
       const Eigen::MatrixXd rival = fitted_columns(*effects[j], now.effect[j], then.effect[j]);
       Eigen::MatrixXd columns(base.rows(), base.cols() + rival.cols());
       columns << base, rival;
@@ -232,31 +283,39 @@ double shrinkage(const Findings& found, const Candidate& effect, const Slopes& n
   return 1;
 }
 
-void rate_unseen(const Findings& found, const std::vector<const Candidate*>& effects, std::size_t from,
-                 const Slopes& now, const Slopes& then, Separation& result) {
+void rate_unseen(const Findings& found, const std::vector<const Candidate*>& effects,
+                 const std::vector<std::string>& unseen, const Slopes& now, const Slopes& then, Separation& result) {
   const Eigen::MatrixXd base = stacked(now.base, then.base);
   const auto solver = base.completeOrthogonalDecomposition();
-  double best = seen_power, sum = 0;
-  for (std::size_t e = from; e < effects.size(); ++e) {
-    Eigen::MatrixXd columns = stacked(now.effect[e], then.effect[e]);
-    columns -= base * solver.solve(columns);
-    const double lambda = shrinkage(found, *effects[e], now, now.effect[e]) * noncentrality(*effects[e], columns);
-    const double power = power_of(found.table, static_cast<int>(columns.cols()), lambda);
-    sum += power;
-    if (power > best) best = power, result.shows = effects[e]->effect;
+  double best = 0, sum = 0, weights = 0;
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    if (std::find(unseen.begin(), unseen.end(), effects[e]->effect) == unseen.end()) continue;
+    double lambda;
+    if (effects[e]->stand_in) {
+      lambda = left_over(stacked(now.left[e], then.left[e]), base);
+    } else {
+      Eigen::MatrixXd columns = stacked(now.effect[e], then.effect[e]);
+      columns -= base * solver.solve(columns);
+      lambda = shrinkage(found, *effects[e], now, now.effect[e]) * noncentrality(*effects[e], columns);
+    }
+    const double power = power_of(found.table, static_cast<int>(effects[e]->slope.cols()), lambda);
+    const double weight = found.priors.of_effect(found.effects(), effects[e]->effect);
+    sum += weight * power;
+    weights += weight;
+    if (power > seen_power && weight * power > best) best = weight * power, result.shows = effects[e]->effect;
   }
-  if (effects.size() > from) result.single_power = sum / static_cast<double>(effects.size() - from);
+  if (weights > 0) result.single_power = sum / weights;
 }
 
 }  // namespace
 
 std::vector<std::string> not_seen(const Findings& found) {
-  std::vector<std::string> effects;
+  std::vector<std::string> effects = unsettled(found.table);
   const auto& named = found.diagnosis.missing;
-  for (const Score& score : found.table.scores)
-    if (score.expected_ln_factor < std::log(factor_that_settles) &&
-        std::find(named.begin(), named.end(), score.effect) == named.end())
-      effects.push_back(score.effect);
+  std::erase_if(effects, [&](const std::string& effect) {
+    const bool left_open = found.diagnosis.verdict == Verdict::ambiguous && found.priors.is_expected(effect);
+    return !left_open && std::find(named.begin(), named.end(), effect) != named.end();
+  });
   return effects;
 }
 
@@ -269,7 +328,8 @@ std::vector<Separation> next_measurements(const Subject& subject, const Findings
   };
   for (const std::string& name : set) add(name);
   const std::size_t in_set = effects.size();
-  for (const std::string& name : not_seen(found))
+  const std::vector<std::string> unseen = not_seen(found);
+  for (const std::string& name : unseen)
     if (std::find(set.begin(), set.end(), name) == set.end()) add(name);
   std::vector<Separation> list;
   if (effects.empty()) return list;
@@ -281,7 +341,7 @@ std::vector<Separation> next_measurements(const Subject& subject, const Findings
       const Slopes then = further(subject, found, options[o], effects, now);
       rated[o].measurement = options[o].name;
       rate_pairs(found, effects, in_set, now, then, rated[o]);
-      rate_unseen(found, effects, in_set, now, then, rated[o]);
+      rate_unseen(found, effects, unseen, now, then, rated[o]);
     } catch (const NumericalFailure&) {
       rated[o].measurement.clear();  // no equilibrium in that pose: nothing can be promised
     }
@@ -295,6 +355,16 @@ std::vector<Separation> next_measurements(const Subject& subject, const Findings
   std::stable_sort(list.begin(), list.end(), [](const Separation& a, const Separation& b) {
     return a.separation != b.separation ? a.separation > b.separation : a.single_power > b.single_power;
   });
+  if (list.empty() || list.front().separation > 0) return list;
+  const auto asks_for = [&](const Separation& s) {
+    return std::find_if(options.begin(), options.end(), [&s](const Option& o) { return o.name == s.measurement; });
+  };
+  const auto as_good = std::find_if(list.begin(), list.end(), [&](const Separation& s) {
+    return s.single_power < list.front().single_power - as_good_as;
+  });
+  const auto least = std::min_element(
+      list.begin(), as_good, [&](const Separation& a, const Separation& b) { return asks_for(a) < asks_for(b); });
+  std::rotate(list.begin(), least, least + 1);
   return list;
 }
 

@@ -112,7 +112,7 @@ TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const Tet
     const int from = grid.nearest(centres.row(c));
     other.tissue[c] = mesh.tissue[from];
     other.fraction.row(c) = mesh.fraction.row(from);
-    other.part_fraction.row(c) = mesh.part_fraction.row(from);
+    if (mesh.part_fraction.cols() > 0) other.part_fraction.row(c) = mesh.part_fraction.row(from);
   }
   if (mesh.order() == 2) {
     other = meshing::to_quadratic(other);

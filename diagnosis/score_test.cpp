@@ -26,6 +26,7 @@ struct Projected {
   Eigen::MatrixXd direction;  // orthonormal
   Eigen::VectorXd secant;     // of length 1; empty where there is none
   double secant_square;       // of the length it had
+  double left;                // square of what its stand-in leaves; < 0 where there is none
   bool one_sided;
 };
 
@@ -44,7 +45,8 @@ class Scorer {
     };
     distance_ = freed(whitening.apply(residuals.distance_mm + mean_mm));
     for (const Candidate& candidate : candidates) {
-      Projected p{freed(whitening.apply(candidate.slope)), {}, {}, 0, false};
+      Projected p{freed(whitening.apply(candidate.slope)), {}, {}, 0, -1, false};
+      if (candidate.stand_in) p.left = freed(whitening.apply(candidate.stand_in->left_mm)).squaredNorm();
       if (candidate.secant.size() > 0) {
         p.secant = freed(whitening.apply(candidate.secant));
         p.secant_square = p.secant.squaredNorm();
@@ -80,8 +82,7 @@ class Scorer {
     score.bic = score.statistic - score.freedom * log_points_;
     predict(candidate, score);
     score.noncentrality = expected(candidate, p);
-    const double q = std::max(score.freedom, 1);
-    score.expected_ln_factor = 0.5 * (score.noncentrality - q * std::log1p(score.noncentrality / q));
+    score.expected_ln_factor = expected_ln_factor(score.noncentrality, score.freedom);
     return score;
   }
 
@@ -151,8 +152,9 @@ class Scorer {
   }
 
   /// T at the typical size. Many effects grow slower than their slope at the null: where the catalogue's size was
-  /// solved, what it changes counts.
+  /// solved, what it changes counts, and where all else was fitted to make up for it, what that leaves.
   static double expected(const Candidate& candidate, const Projected& p) {
+    if (p.left >= 0) return p.left;
     if (p.secant.size() > 0) return p.secant_square;
     double sum = 0;
     for (Eigen::Index k = 0; k < p.slope.cols(); ++k)
@@ -171,6 +173,22 @@ class Scorer {
 };
 
 }  // namespace
+
+double expected_ln_factor(double noncentrality, int freedom) {
+  const double q = std::max(freedom, 1);
+  return 0.5 * (noncentrality - q * std::log1p(noncentrality / q));
+}
+
+bool settles(double noncentrality, int freedom) {
+  return expected_ln_factor(noncentrality, freedom) >= std::log(settling_factor);
+}
+
+std::vector<std::string> unsettled(const ScoreTable& table) {
+  std::vector<std::string> effects;
+  for (const Score& score : table.scores)
+    if (!settles(score.noncentrality, score.freedom)) effects.push_back(score.effect);
+  return effects;
+}
 
 double power_of(const ScoreTable& table, int freedom, double noncentrality) {
   return chi_squared_power(freedom, noncentrality, table.chance_bic + freedom * std::log(table.effective_points));

@@ -26,8 +26,9 @@ struct Score {
   bool beyond_range;        ///< a step leaves three times the range from null to bound: right shape, implausible amount
   double predicted_rms_mm;  ///< of all points after the joint linear step, steps cut at the bounds
   double predicted_held_out_rms_mm;  ///< the same, every block of skin predicted without itself
-  double noncentrality;       ///< λ, T expected beyond noise at the typical size: along the secant where there is one
-  double power;               ///< chance that T at the typical size is above what 5 % of scans without any effect reach
+  double noncentrality;  ///< λ, T expected beyond noise at the typical size: along the secant where there is one; of a
+                         ///< stand-in what it leaves
+  double power;          ///< chance that T at the typical size is above what 5 % of scans without any effect reach
   double expected_ln_factor;  ///< ½(λ − q ln(1 + λ/q)), of the evidence for it where it is there at its typical size,
                               ///< under a normal prior as wide as that (Laplace, over noise)
   std::vector<std::string> not_told_apart_from;  ///< candidates with a canonical correlation above 0.9
@@ -44,6 +45,18 @@ struct ScoreTable {
   /// = this measurement cannot tell them apart.
   Eigen::MatrixXd alike;
 };
+
+/// A Bayes factor that settles whether an effect is there.
+inline constexpr double settling_factor = 3;
+
+/// ½(λ − q ln(1 + λ/q)) of @p noncentrality λ and @p freedom q; all without unit.
+double expected_ln_factor(double noncentrality, int freedom);
+
+/// Whether that is ln of a factor that settles.
+bool settles(double noncentrality, int freedom);
+
+/// Effects that the scan could not settle if they were there at their typical size.
+std::vector<std::string> unsettled(const ScoreTable& table);
 
 /// Chance that an effect of @p freedom directions and @p noncentrality scores above chance, noise added.
 double power_of(const ScoreTable& table, int freedom, double noncentrality);

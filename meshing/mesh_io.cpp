@@ -154,9 +154,11 @@ void write_mesh(const TetMesh& mesh, const std::filesystem::path& file, const st
 }
 
 void write_pose(const TetMesh& mesh, const Points& positions, const NamedTables& point_arrays,
-                const NamedTables& cell_arrays, const std::filesystem::path& file, const std::string& side) {
+                const NamedTables& cell_arrays, const std::filesystem::path& file, const std::string& side,
+                const std::string& pose) {
   check_rows("positions", positions.rows(), mesh.points.rows(), "points");
   const auto grid = to_grid(mesh, positions, side);
+  if (!pose.empty()) grid->GetFieldData()->AddArray(to_strings("pose", std::vector<std::string>{pose}));
   grid->GetPointData()->AddArray(to_array("displacement_mm", positions - mesh.points));
   for (const auto& [name, table] : point_arrays) {
     check_rows(name, table.rows(), mesh.points.rows(), "points");
@@ -176,8 +178,11 @@ TetMesh read_mesh(const std::filesystem::path& file) { return VtuReader(file).me
 
 std::string read_side(const std::filesystem::path& file) { return VtuReader(file).text("side").value_or(""); }
 
-PoseMesh read_pose(const std::filesystem::path& file) {
+PoseMesh read_pose(const std::filesystem::path& file, const std::string& wanted) {
   const VtuReader reader(file);
+  if (const auto shown = reader.text("pose"); shown && !wanted.empty() && *shown != wanted)
+    throw InputError(fmt::format("{}: shows pose '{}', '{}' is expected; copied over or renamed? Simulate again",
+                                 file.string(), *shown, wanted));
   const Table displacement = reader.point_array("displacement_mm", 3);
   PoseMesh pose;
   pose.mesh = reader.mesh(displacement);

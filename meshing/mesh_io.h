@@ -33,14 +33,16 @@ TetMesh read_mesh(const std::filesystem::path& file);
 std::string read_side(const std::filesystem::path& file);
 
 /// Writes a pose: the grid of write_mesh() with its points at @p positions, point array `displacement_mm`
-/// (position - prone), and the given arrays.
+/// (position - prone), the given arrays, and field data `pose` when @p pose is not empty.
 /// @param mesh          imaged (prone) mesh
 /// @param positions     #N by 3, mm
 /// @param point_arrays  #N rows each
 /// @param cell_arrays   #C rows each (NaN is written on the triangles), or #C + #F rows (tetrahedra, then triangles)
+/// @param pose          name of the pose
 /// @throws InputError  when the file cannot be written or a table has the wrong number of rows
 void write_pose(const TetMesh& mesh, const Points& positions, const NamedTables& point_arrays,
-                const NamedTables& cell_arrays, const std::filesystem::path& file, const std::string& side = {});
+                const NamedTables& cell_arrays, const std::filesystem::path& file, const std::string& side = {},
+                const std::string& pose = {});
 
 /// A pose as read: the imaged mesh and where its points are in the pose.
 struct PoseMesh {
@@ -50,7 +52,8 @@ struct PoseMesh {
 };
 
 /// Reads what write_pose() wrote.
-/// @throws InputError  as read_mesh(); no `displacement_mm`
-PoseMesh read_pose(const std::filesystem::path& file);
+/// @param wanted  the pose that the file must show, if it names one; empty: any
+/// @throws InputError  as read_mesh(); no `displacement_mm`; another pose
+PoseMesh read_pose(const std::filesystem::path& file, const std::string& wanted = {});
 
 }  // namespace supine::meshing

@@ -4,42 +4,26 @@
 #include <fmt/format.h>
 #include <vtkCellData.h>
 #include <vtkCellType.h>
-#include <vtkCommand.h>
 #include <vtkDataArray.h>
-#include <vtkExecutive.h>
 #include <vtkFieldData.h>
 #include <vtkIdList.h>
 #include <vtkNew.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkSmartPointer.h>
-#include <vtkStringArray.h>
 #include <vtkUnstructuredGrid.h>
-#include <vtkXMLUnstructuredGridReader.h>
 
 #include <cmath>
 #include <limits>
 
 #include "common/error.h"
-#include "common/trial_process.h"
+#include "common/vtk_files.h"
 #include "meshing/mesh_check.h"
 #include "meshing/topology.h"
 #include "segmentation/tissue.h"
 
 namespace supine::meshing {
 namespace {
-
-// Keeps VTK's complaints off the terminal and remembers the first.
-class FirstError : public vtkCommand {
- public:
-  static FirstError* New() { return new FirstError; }
-  void Execute(vtkObject*, unsigned long, void* message) override {
-    if (text.empty() && message != nullptr) text = static_cast<const char*>(message);
-    failed = true;
-  }
-  std::string text;
-  bool failed = false;
-};
 
 Table to_table(vtkDataArray& array) {
   Table table(array.GetNumberOfTuples(), array.GetNumberOfComponents());
@@ -64,21 +48,7 @@ struct VtuReader::Grid {
 };
 
 VtuReader::VtuReader(const std::filesystem::path& file) : file_(file), grid_(std::make_unique<Grid>()) {
-  if (!std::filesystem::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
-  check_survivable_by<vtkXMLUnstructuredGridReader>(file);
-  vtkNew<vtkXMLUnstructuredGridReader> reader;
-  vtkNew<FirstError> errors;
-  vtkNew<FirstError> parse_errors;
-  reader->AddObserver(vtkCommand::ErrorEvent, errors);
-  reader->GetExecutive()->AddObserver(vtkCommand::ErrorEvent, errors);
-  reader->SetParserErrorObserver(parse_errors);
-  reader->SetReaderErrorObserver(errors);
-  reader->SetFileName(file.c_str());
-  reader->Update();
-  if (errors->failed || parse_errors->failed || reader->GetErrorCode() != 0) {
-    throw InputError(fmt::format("{}: is not a readable .vtu file (cut off while it was written?)", file.string()));
-  }
-  grid_->vtk = reader->GetOutput();
+  grid_->vtk = read_vtu(file);
   if (text("frame").value_or("LPS") != "LPS") {
     throw InputError(fmt::format("{}: frame is \"{}\"; meshes are LPS", file.string(), *text("frame")));
   }
@@ -89,11 +59,9 @@ VtuReader::VtuReader(const std::filesystem::path& file) : file_(file), grid_(std
 
 VtuReader::~VtuReader() = default;
 
-std::optional<std::string> VtuReader::text(const std::string& field) const {
-  const auto* array = vtkStringArray::SafeDownCast(grid_->vtk->GetFieldData()->GetAbstractArray(field.c_str()));
-  if (array == nullptr || array->GetNumberOfValues() == 0) return std::nullopt;
-  return const_cast<vtkStringArray*>(array)->GetValue(0);
-}
+std::optional<std::string> VtuReader::text(const std::string& field) const { return field_text(*grid_->vtk, field); }
+
+std::vector<std::string> VtuReader::texts(const std::string& field) const { return field_texts(*grid_->vtk, field); }
 
 Points VtuReader::positions() const {
   Points points(grid_->vtk->GetNumberOfPoints(), 3);
@@ -108,9 +76,6 @@ Table VtuReader::point_array(const std::string& name, int components) const {
     throw InputError(fmt::format("{}: point array \"{}\" has {} components, {} are expected", file_.string(), name,
                                  array->GetNumberOfComponents(), components));
   }
-  if (array->GetNumberOfTuples() != grid_->vtk->GetNumberOfPoints())
-    throw InputError(fmt::format("{}: point array \"{}\" has {} entries, the file has {} points", file_.string(), name,
-                                 array->GetNumberOfTuples(), grid_->vtk->GetNumberOfPoints()));
   return to_table(*array);
 }
 
@@ -126,10 +91,9 @@ NamedTables VtuReader::point_arrays() const {
 Table VtuReader::cell_column(const std::string& name) const {
   vtkDataArray* array = grid_->vtk->GetCellData()->GetArray(name.c_str());
   if (array == nullptr) throw InputError(fmt::format("{}: has no cell array \"{}\"", file_.string(), name));
-  if (array->GetNumberOfTuples() != grid_->vtk->GetNumberOfCells() || array->GetNumberOfComponents() != 1)
-    throw InputError(fmt::format("{}: cell array \"{}\" has {} × {} numbers, the file has {} cells", file_.string(),
-                                 name, array->GetNumberOfTuples(), array->GetNumberOfComponents(),
-                                 grid_->vtk->GetNumberOfCells()));
+  if (array->GetNumberOfComponents() != 1)
+    throw InputError(fmt::format("{}: cell array \"{}\" has {} numbers a cell, 1 is expected", file_.string(), name,
+                                 array->GetNumberOfComponents()));
   return to_table(*array);
 }
 
@@ -139,14 +103,8 @@ Indices VtuReader::nodes_of(long long cell, int wanted) const {
   if (nodes->GetNumberOfIds() != wanted)
     throw InputError(fmt::format("{}: cell {} has {} nodes; its kind has {}", file_.string(), cell,
                                  nodes->GetNumberOfIds(), wanted));
-  const vtkIdType points = grid_->vtk->GetNumberOfPoints();
   Indices of_cell(1, wanted);
-  for (int k = 0; k < wanted; ++k) {
-    const vtkIdType node = nodes->GetId(k);
-    if (node < 0 || node >= points)
-      throw InputError(fmt::format("{}: cell {} names node {}, the file has {}", file_.string(), cell, node, points));
-    of_cell(0, k) = static_cast<int>(node);
-  }
+  for (int k = 0; k < wanted; ++k) of_cell(0, k) = static_cast<int>(nodes->GetId(k));
   return of_cell;
 }
 
@@ -207,13 +165,6 @@ void VtuReader::read_muscle(TetMesh& mesh) const {
     throw InputError(
         fmt::format("{}: muscle_triangles names a point that muscle_points_mm does not have", file_.string()));
   }
-}
-
-std::vector<std::string> VtuReader::texts(const std::string& field) const {
-  auto* array = vtkStringArray::SafeDownCast(grid_->vtk->GetFieldData()->GetAbstractArray(field.c_str()));
-  std::vector<std::string> values;
-  for (vtkIdType i = 0; array != nullptr && i < array->GetNumberOfValues(); ++i) values.push_back(array->GetValue(i));
-  return values;
 }
 
 void VtuReader::read_parts(TetMesh& mesh) const {

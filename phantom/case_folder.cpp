@@ -83,6 +83,10 @@ kind = "elastic"
 stiffness_kpa_per_mm = 1.0
 )";
 
+constexpr const char* contact_text = R"([contact]
+kind = "chest"
+)";
+
 // One gzip member without name or time.
 std::string gzipped(const std::vector<std::uint8_t>& bytes) {
   z_stream stream{};
@@ -174,7 +178,7 @@ void write_series_folder(const fs::path& folder, const fs::path& truth, const Ma
 void write_case_folder(const fs::path& folder, const CaseContents& contents, Outputs& outputs) {
   const std::string name = fs::absolute(folder).lexically_normal().filename().string();
   write_text(case_text(name, contents), folder / "case.toml", outputs);
-  write_text(model_text, folder / "model.toml", outputs);
+  write_text(std::string(model_text) + (contents.on_chest ? contact_text : ""), folder / "model.toml", outputs);
   write_text(nrrd_text(contents.labels.grid, "uint8", contents.labels.voxels), folder / "labels.nrrd", outputs);
   write_landmarks(contents.prone_landmarks, outputs.stage(folder / "prone_landmarks.csv"));
   for (const MeasuredPose& pose : contents.poses) {

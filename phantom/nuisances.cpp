@@ -180,7 +180,8 @@ std::map<std::string, double> nuisance_sigma(const std::string& cause) {
   std::map<std::string, double> sigma;
   for (const auto& [parameter, nuisance] : cause_kind(cause).nuisance) {
     const auto& rows = nuisance_rows();
-    const auto row = std::find_if(rows.begin(), rows.end(), [&](const NuisanceRow& r) { return r.name == nuisance; });
+    const auto row =
+        std::find_if(rows.begin(), rows.end(), [&name = nuisance](const NuisanceRow& r) { return r.name == name; });
     sigma[parameter] = row->sigma;
   }
   return sigma;

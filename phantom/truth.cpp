@@ -5,6 +5,7 @@
 #include "simulation/model_fields.h"
 #include "simulation/parameters.h"
 #include "simulation/solve/equilibrium.h"
+#include "simulation/solve/turning.h"
 
 namespace supine::phantom {
 namespace {
@@ -38,6 +39,7 @@ simulation::Model truth_model(const Body& body) {
   model.breast.density_refers_to = simulation::DensityReference::undeformed;
   model.skin.law = simulation::SkinLaw::neo_hookean;
   model.skin.young_modulus_kpa.value = body.skin_kpa;
+  if (body.on_chest) model.contact.kind = simulation::ContactKind::chest;
   return model;
 }
 
@@ -64,6 +66,15 @@ const simulation::Mechanics& Truth::in(const TruthPose& pose) {
   return mechanics_;
 }
 
+/// Follows the body from the shape of one pose to that of another as gravity turns. @return false: the way ends before
+bool Truth::turn_over(simulation::EquilibriumSolver& solver, const TruthPose& from, TruthPose& pose) {
+  const auto load = [this, &pose](const Eigen::Vector3d& gravity) { in({pose.name, gravity, {}}); };
+  const simulation::Turn turn = simulation::turn_of(body_mesh_.anatomy, from.gravity, pose.gravity);
+  pose.x = from.x;
+  return simulation::turn_over(solver, turn, load, body_mesh_.mesh.points, pose.x, from.name + " → " + pose.name)
+      .has_value();
+}
+
 void Truth::solve(std::vector<TruthPose>& poses, Start start) {
   simulation::SolveOptions options;
   options.step_tolerance_mm = 1e-6;
@@ -73,8 +84,13 @@ void Truth::solve(std::vector<TruthPose>& poses, Start start) {
     in(pose);
     solver.forget();
     const Points near = pose.x;
-    solver.forward(body_mesh_.mesh.points, pose.x, "undeformed → " + pose.name,
-                   start == Start::shapes ? &near : nullptr);
+    try {
+      solver.forward(body_mesh_.mesh.points, pose.x, "undeformed → " + pose.name,
+                     start == Start::shapes ? &near : nullptr);
+    } catch (const simulation::NoEquilibrium&) {
+      // Other populations stay what they were.
+      if (!body_.on_chest || &pose == &poses.front() || !turn_over(solver, poses.front(), pose)) throw;
+    }
   }
 }
 

@@ -9,6 +9,10 @@
 #include "phantom/nuisances.h"
 #include "simulation/mechanics.h"
 
+namespace supine::simulation {
+class EquilibriumSolver;
+}
+
 namespace supine::phantom {
 
 /// A body position of the phantom.
@@ -41,6 +45,8 @@ class Truth {
   void solve(std::vector<TruthPose>& poses, Start start = Start::no_load);
 
  private:
+  bool turn_over(simulation::EquilibriumSolver& solver, const TruthPose& from, TruthPose& pose);
+
   const BodyMesh& body_mesh_;
   const Body& body_;
   std::vector<Cause> causes_;

@@ -4,7 +4,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set(supine_libraries supine_options supine_common)
+set(supine_libraries supine_options supine_common supine_vtk)
 foreach(folder segmentation reconstruction meshing simulation calibration registration diagnosis warp pipeline picture)
   if(TARGET supine_${folder})
     list(APPEND supine_libraries supine_${folder})

@@ -254,7 +254,7 @@ void check_size(std::istream& in, const std::filesystem::path& file, const PlyHe
 }
 
 void read_property_value(Numbers& numbers, const PlyElement& element, const PlyProperty& property, long long entry,
-                         const std::filesystem::path& file, PlySurface& surface) {
+                         const std::filesystem::path& file, Polygons& surface) {
   if (!property.count_type.empty()) {
     const bool corners = is_corners(element, property);
     std::vector<int> list = read_list(numbers, property, corners, surface.points.rows(), file);
@@ -303,7 +303,7 @@ PlyHeader read_header(std::istream& in, const std::filesystem::path& file) {
 
 }  // namespace
 
-PlySurface read_ply(const std::filesystem::path& file) {
+Polygons read_ply(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(fmt::format("{}: cannot be read", file.string()));
   const PlyHeader header = read_header(in, file);
@@ -312,7 +312,7 @@ PlySurface read_ply(const std::filesystem::path& file) {
   Numbers& numbers = header.format == PlyHeader::Format::ascii ? static_cast<Numbers&>(ascii) : binary;
   const long long vertices = element_of(header, "vertex")->count;
   check_size(in, file, header);
-  PlySurface surface{Points(vertices, 3), {}, header.declaration};
+  Polygons surface{Points(vertices, 3), {}, header.declaration};
   for (const PlyElement& element : header.elements)
     for (long long entry = 0; entry < element.count; ++entry) {
       numbers.begin_entry();
@@ -320,6 +320,12 @@ PlySurface read_ply(const std::filesystem::path& file) {
         read_property_value(numbers, element, property, entry, file, surface);
       numbers.end_entry();
     }
+  for (char rest = 0; in.get(rest);)
+    if (rest != '\n' && rest != '\r' && rest != ' ' && rest != '\t' && rest != '\0')
+      throw InputError(
+          fmt::format("{}: goes on after the last entry that its header counts (\"element vertex {}\" and others): "
+                      "counts are wrong, or two files were joined; write the file again",
+                      file.string(), vertices));
   return surface;
 }
 

@@ -157,10 +157,13 @@ Surface reversed_region(const Surface& surface, Region region) {
 }
 
 void ReconstructOptions::check() const {
-  if (smooth_mm && !(*smooth_mm >= 0)) throw InputError(fmt::format("smooth_mm is {}; it must be >= 0", *smooth_mm));
+  constexpr double most_smooth_mm = 20, most_piece_mm3 = 1e6;
+  if (smooth_mm && !(*smooth_mm >= 0 && *smooth_mm <= most_smooth_mm))
+    throw InputError(fmt::format("smooth_mm is {}; it must lie in [0, {}]", *smooth_mm, most_smooth_mm));
   if (!(cut.rim_mm > 0)) throw InputError(fmt::format("rim_mm is {}; it must be > 0", cut.rim_mm));
-  if (!(smallest_piece_mm3 >= 0))
-    throw InputError(fmt::format("smallest_piece_mm3 is {}; it must be >= 0", smallest_piece_mm3));
+  if (!(smallest_piece_mm3 >= 0 && smallest_piece_mm3 <= most_piece_mm3))
+    throw InputError(
+        fmt::format("smallest_piece_mm3 is {}; it must lie in [0, {}]", smallest_piece_mm3, most_piece_mm3));
   if (!(thinnest_mm >= 0)) throw InputError(fmt::format("thinnest_mm is {}; it must be >= 0", thinnest_mm));
   if (most_organ_triangles < 1000)
     throw InputError(fmt::format("most_organ_triangles is {}; it must be >= 1000", most_organ_triangles));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "reconstruction/voxel_surface.h"
+#include "segmentation/support_voxels.h"
 
 namespace supine::reconstruction {
 
@@ -14,7 +15,7 @@ struct CutRules {
 };
 
 /// Islands of one region inside another that are smaller than this are noise of the labels.
-inline constexpr double smallest_island_mm2 = 20;
+inline constexpr double smallest_island_mm2 = segmentation::smallest_contact_mm2;
 
 /// Gives every triangle of the breast's surface its region, from the voxel beyond it: muscle → inner, air → skin,
 /// excluded, image edge and bare rim → cut where the rules allow it.

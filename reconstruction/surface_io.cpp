@@ -2,95 +2,61 @@
 #include "reconstruction/surface_io.h"
 
 #include <fmt/core.h>
-#include <vtkAlgorithm.h>
-#include <vtkCallbackCommand.h>
 #include <vtkCellArray.h>
 #include <vtkCellData.h>
 #include <vtkCleanPolyData.h>
 #include <vtkDataArray.h>
-#include <vtkExecutive.h>
 #include <vtkFieldData.h>
 #include <vtkIntArray.h>
 #include <vtkNew.h>
-#include <vtkOBJReader.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkSTLReader.h>
 #include <vtkSmartPointer.h>
 #include <vtkStringArray.h>
 #include <vtkTriangleFilter.h>
-#include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
-#include <vtkXMLReader.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <numeric>
 #include <set>
+#include <tuple>
 #include <vector>
 
 #include "common/error.h"
 #include "common/trial_process.h"
+#include "common/vtk_errors.h"
+#include "common/vtk_files.h"
+#include "reconstruction/obj_file.h"
 #include "reconstruction/ply_file.h"
 #include "reconstruction/surface_text.h"
 
 namespace supine::reconstruction {
 namespace {
 
-// Keeps what VTK's algorithms would print, so that it can become an error message.
-class VtkErrors {
- public:
-  explicit VtkErrors(vtkAlgorithm& algorithm) : algorithm_(algorithm) {
-    command_->SetCallback([](vtkObject*, unsigned long, void* client, void* text) {
-      auto& message = *static_cast<std::string*>(client);
-      if (message.empty() && text != nullptr) message = static_cast<const char*>(text);
-    });
-    command_->SetClientData(&message_);
-    algorithm.AddObserver(vtkCommand::ErrorEvent, command_);
-    algorithm.GetExecutive()->AddObserver(vtkCommand::ErrorEvent, command_);
-    if (auto* xml = vtkXMLReader::SafeDownCast(&algorithm)) {
-      xml->SetReaderErrorObserver(command_);
-      xml->SetParserErrorObserver(command_);
-    }
-  }
-  VtkErrors(const VtkErrors&) = delete;
-  VtkErrors& operator=(const VtkErrors&) = delete;
-  ~VtkErrors() {
-    algorithm_.RemoveAllObservers();
-    algorithm_.GetExecutive()->RemoveAllObservers();
-  }
-  bool any() const { return !message_.empty() || algorithm_.GetErrorCode() != 0; }
-  std::string text() const {
-    std::string text = message_;
-    std::replace(text.begin(), text.end(), '\n', ' ');
-    const auto end_of_place = text.find("): ");  // "ERROR: In FILE, line N CLASS (ADDRESS): "
-    return text.starts_with("ERROR: In ") && end_of_place != std::string::npos ? text.substr(end_of_place + 3) : text;
-  }
-
- private:
-  vtkAlgorithm& algorithm_;
-  std::string message_;
-  vtkNew<vtkCallbackCommand> command_;
-};
-
-template <class Reader>
-vtkSmartPointer<vtkPolyData> run_reader(const std::filesystem::path& file) {
-  check_survivable_by<Reader>(file);
-  vtkNew<Reader> reader;
+vtkSmartPointer<vtkPolyData> read_stl_once(const std::filesystem::path& file) {
+  vtkNew<vtkSTLReader> reader;
   reader->SetFileName(file.c_str());
   const VtkErrors errors(*reader);
   reader->Update();
-  vtkSmartPointer<vtkPolyData> data = reader->GetOutput();
   if (errors.any()) throw InputError(fmt::format("{}: cannot be read: {}", file.string(), errors.text()));
-  return data;
+  return reader->GetOutput();
 }
 
-vtkSmartPointer<vtkPolyData> polygons_of(const PlySurface& ply) {
+vtkSmartPointer<vtkPolyData> read_stl(const std::filesystem::path& file) {
+  check_survivable(file, [&file] { read_stl_once(file); });
+  return read_stl_once(file);
+}
+
+vtkSmartPointer<vtkPolyData> polygons_of(const Polygons& polygons) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
-  for (const auto& point : ply.points.rowwise()) points->InsertNextPoint(point.x(), point.y(), point.z());
+  for (const auto& point : polygons.points.rowwise()) points->InsertNextPoint(point.x(), point.y(), point.z());
   vtkNew<vtkCellArray> faces;
-  for (const std::vector<int>& face : ply.faces) {
+  for (const std::vector<int>& face : polygons.faces) {
     faces->InsertNextCell(static_cast<int>(face.size()));
     for (const int vertex : face) faces->InsertCellPoint(vertex);
   }
@@ -100,29 +66,10 @@ vtkSmartPointer<vtkPolyData> polygons_of(const PlySurface& ply) {
   return data;
 }
 
-void declare_from_field_data(vtkPolyData* data, const std::filesystem::path& file, Declaration& declaration) {
-  for (const char* key : {"frame", "unit"}) {
-    auto* text = vtkStringArray::SafeDownCast(data->GetFieldData()->GetAbstractArray(key));
-    if (text == nullptr) continue;
-    for (vtkIdType i = 0; i < text->GetNumberOfValues(); ++i)
-      read_declaration(fmt::format("{} {}", key, text->GetValue(i)), file, declaration);
-  }
-}
-
-// Point indices are checked here because the filters that follow trust them.
-void check_cells(vtkPolyData* data, const std::filesystem::path& file) {
-  const vtkIdType points = data->GetNumberOfPoints();
-  for (vtkCellArray* cells : {data->GetPolys(), data->GetStrips()}) {
-    for (vtkIdType c = 0; c < cells->GetNumberOfCells(); ++c) {
-      vtkIdType size = 0;
-      const vtkIdType* ids = nullptr;
-      cells->GetCellAtId(c, size, ids);
-      for (vtkIdType i = 0; i < size; ++i)
-        if (ids[i] < 0 || ids[i] >= points)
-          throw InputError(fmt::format("{}: face {} names point {}, the file has {}", file.string(), c,
-                                       static_cast<long long>(ids[i]), points));
-    }
-  }
+void declare_from_field_data(vtkPolyData& data, const std::filesystem::path& file, Declaration& declaration) {
+  for (const char* key : {"frame", "unit"})
+    for (const std::string& value : field_texts(data, key))
+      read_declaration(fmt::format("{} {}", key, value), file, declaration);
 }
 
 vtkSmartPointer<vtkPolyData> only_triangles(vtkPolyData* data, bool merge_points) {
@@ -144,13 +91,9 @@ vtkSmartPointer<vtkPolyData> only_triangles(vtkPolyData* data, bool merge_points
   return triangulate->GetOutput();
 }
 
-void copy_points(vtkPolyData* data, const std::filesystem::path& file, Surface& surface) {
+void copy_points(vtkPolyData* data, Surface& surface) {
   surface.points.resize(data->GetNumberOfPoints(), 3);
-  for (vtkIdType p = 0; p < data->GetNumberOfPoints(); ++p) {
-    data->GetPoint(p, surface.points.row(p).data());
-    if (!surface.points.row(p).allFinite())
-      throw InputError(fmt::format("{}: point {} has a coordinate that is not a finite number", file.string(), p));
-  }
+  for (vtkIdType p = 0; p < data->GetNumberOfPoints(); ++p) data->GetPoint(p, surface.points.row(p).data());
 }
 
 void copy_triangles(vtkPolyData* data, Surface& surface) {
@@ -164,16 +107,54 @@ void copy_triangles(vtkPolyData* data, Surface& surface) {
   }
 }
 
-/// A triangle that stands twice, either way round, is the same surface once: it would count twice in every mean.
+/// For each point the first one at its place.
+std::vector<int> first_at_place(const Points& points) {
+  std::vector<int> order(points.rows()), first(points.rows());
+  std::iota(order.begin(), order.end(), 0);
+  const auto key = [&points](int p) { return std::tuple(points(p, 0), points(p, 1), points(p, 2), p); };
+  std::sort(order.begin(), order.end(), [&key](int a, int b) { return key(a) < key(b); });
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const int p = order[i];
+    const bool again = i > 0 && points.row(p) == points.row(order[i - 1]);
+    first[p] = again ? first[order[i - 1]] : p;
+  }
+  return first;
+}
+
+/// A triangle that stands twice, either way round, with points of its own or not, is the same surface once: it would
+/// count twice in every mean.
 void drop_doubled_triangles(Surface& surface) {
+  const std::vector<int> first = first_at_place(surface.points);
   std::set<std::array<int, 3>> known;
   Eigen::Index kept = 0;
   for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
-    std::array<int, 3> corners = {surface.triangles(t, 0), surface.triangles(t, 1), surface.triangles(t, 2)};
+    std::array<int, 3> corners = {first[surface.triangles(t, 0)], first[surface.triangles(t, 1)],
+                                  first[surface.triangles(t, 2)]};
     std::sort(corners.begin(), corners.end());
     if (known.insert(corners).second) surface.triangles.row(kept++) = surface.triangles.row(t).eval();
   }
   surface.triangles.conservativeResize(kept, 3);
+}
+
+/// A reading that stands twice says no more than once, and its neighbour at no distance would show no noise.
+void drop_doubled_points(Surface& cloud) {
+  const std::vector<int> first = first_at_place(cloud.points);
+  Eigen::Index kept = 0;
+  for (Eigen::Index p = 0; p < cloud.points.rows(); ++p)
+    if (first[p] == p) cloud.points.row(kept++) = cloud.points.row(p).eval();
+  cloud.points.conservativeResize(kept, 3);
+}
+
+void check_area(const std::filesystem::path& file, const Surface& surface) {
+  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
+    const Eigen::RowVector3d a = surface.points.row(surface.triangles(t, 0)),
+                             b = surface.points.row(surface.triangles(t, 1)),
+                             c = surface.points.row(surface.triangles(t, 2));
+    if ((b - a).cross(c - a).norm() > 0) return;
+  }
+  if (surface.triangles.rows() > 0)
+    throw InputError(fmt::format("{}: none of its {} triangles has an area; write the file again", file.string(),
+                                 surface.triangles.rows()));
 }
 
 void copy_region(vtkPolyData* data, const std::filesystem::path& file, Surface& surface) {
@@ -216,35 +197,35 @@ void set_text(vtkPolyData* data, const char* key, const char* value) {
 SurfaceFile read_surface_file(const std::filesystem::path& file) {
   if (!std::filesystem::is_regular_file(file))
     throw InputError(fmt::format("{}: there is no such file", file.string()));
-  const std::string kind = file.extension().string();
+  std::string kind = file.extension().string();
+  std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return std::tolower(c); });
   vtkSmartPointer<vtkPolyData> data;
   Declaration declaration;
-  if (kind == ".ply") {
-    PlySurface ply = read_ply(file);
-    declaration = ply.declaration;
-    data = polygons_of(ply);
+  if (kind == ".ply" || kind == ".obj") {
+    const Polygons polygons = kind == ".ply" ? read_ply(file) : read_obj(file);
+    declaration = polygons.declaration;
+    data = polygons_of(polygons);
   } else if (kind == ".stl") {
     declaration = inspect_stl(file);
-    data = run_reader<vtkSTLReader>(file);
-  } else if (kind == ".obj") {
-    declaration = inspect_obj(file);
-    data = run_reader<vtkOBJReader>(file);
+    data = read_stl(file);
   } else if (kind == ".vtp") {
-    data = run_reader<vtkXMLPolyDataReader>(file);
-    declare_from_field_data(data, file, declaration);
+    data = read_vtp(file);
+    declare_from_field_data(*data, file, declaration);
   } else {
     throw InputError(fmt::format("{}: surfaces are read from .ply, .stl, .obj and .vtp files, not from \"{}\"",
-                                 file.string(), kind));
+                                 file.string(), file.extension().string()));
   }
   if (data->GetNumberOfPoints() == 0) throw InputError(fmt::format("{}: has no points", file.string()));
-  check_cells(data, file);
+  check_sound(file, *data);
   SurfaceFile result{{}, declaration.frame};
   if (data->GetNumberOfPolys() + data->GetNumberOfStrips() > 0)
     data = only_triangles(data, kind == ".stl" || kind == ".obj");
-  copy_points(data, file, result.surface);
+  copy_points(data, result.surface);
   copy_triangles(data, result.surface);
   copy_region(data, file, result.surface);
-  if (kind != ".vtp") drop_doubled_triangles(result.surface);
+  if (result.surface.triangles.rows() == 0) drop_doubled_points(result.surface);
+  if (result.surface.region.size() == 0) drop_doubled_triangles(result.surface);
+  check_area(file, result.surface);
   drop_unused_points(result.surface);
   return result;
 }

@@ -21,10 +21,12 @@ struct SurfaceFile {
 /// A frame is declared by a comment `frame LPS` (PLY and OBJ comments, the header of an STL, also with
 /// `=` or `:`) or by the string field data `frame` (VTP); `region` is the cell array of our own VTP files.
 /// STL repeats its points: they are merged. Points no triangle uses are kept only where there are no triangles at all.
+/// Triangles that stand twice, and points of a bare cloud that do, are read once. Lines and points of an OBJ are not
+/// read. Endings may be in capitals.
 /// @throws InputError  file missing, unreadable, cut short or of another kind; no points; a coordinate that is not
 /// finite
 ///   (names the point); a triangle that names a point there is not; a frame other than LPS and RAS, or two of them in
-///   one file; a declared unit other than mm; a region outside 0 to 4
+///   one file; a declared unit other than mm; a region outside 0 to 4; triangles without any area
 SurfaceFile read_surface_file(const std::filesystem::path& file);
 
 /// Reads a surface into patient LPS, mm: one declared as RAS is turned (x and y negated), one that declares no

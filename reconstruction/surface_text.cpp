@@ -32,45 +32,10 @@ std::vector<std::string> words(std::string_view line) {
   return result;
 }
 
-long long number(const std::string& text, const std::filesystem::path& file, std::string_view what) {
-  long long value = -1;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size())
-    throw InputError(fmt::format("{}: {} is not a whole number: \"{}\"", file.string(), what, text));
-  return value;
-}
-
 std::ifstream open(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw InputError(fmt::format("{}: cannot be read", file.string()));
   return in;
-}
-
-// Resolves one index of an OBJ face ("7", "7/1/3", "-2") and checks that the vertex is there.
-void check_obj_index(const std::string& token, long long vertices, const std::filesystem::path& file, long long line) {
-  const long long index = number(token.substr(0, token.find('/')), file, fmt::format("a face index in line {}", line));
-  if (index == 0 || index > vertices || -index > vertices)
-    throw InputError(
-        fmt::format("{}: line {}: face names vertex {}, the file has {}", file.string(), line, index, vertices));
-}
-
-// Readers of other libraries stop at the comma of a decimal one, and say nothing.
-void check_coordinates(const std::vector<std::string>& words, const std::filesystem::path& file, long long line) {
-  for (std::size_t i = 1; i <= 3; ++i) {
-    double value = std::nan("");
-    const std::string word = i < words.size() ? words[i] : "";
-    const char *begin = word.data() + (word.starts_with('+') ? 1 : 0), *end = word.data() + word.size();
-    const auto parsed = std::from_chars(begin, end, value);
-    if (parsed.ec == std::errc() && parsed.ptr == end && std::isfinite(value)) continue;
-    throw InputError(fmt::format("{}: line {}: a vertex needs three finite numbers, and \"{}\" is none{}",
-                                 file.string(), line, word,
-                                 word.find(',') == std::string::npos ? "" : "; decimals are written with a point"));
-  }
-}
-
-std::vector<std::string> parted_by_blanks(const std::string& line) {
-  std::istringstream in(line);
-  return {std::istream_iterator<std::string>(in), {}};
 }
 
 void declare_frame(const std::string& frame, const std::filesystem::path& file, Declaration& declaration) {
@@ -84,6 +49,27 @@ void declare_frame(const std::string& frame, const std::filesystem::path& file, 
 }
 
 }  // namespace
+
+std::vector<std::string> parted_by_blanks(const std::string& line) {
+  std::istringstream in(line);
+  return {std::istream_iterator<std::string>(in), {}};
+}
+
+Eigen::RowVector3d read_coordinates(const std::vector<std::string>& words, const std::filesystem::path& file,
+                                    long long line) {
+  Eigen::RowVector3d place;
+  for (std::size_t i = 1; i <= 3; ++i) {
+    double& value = place[static_cast<Eigen::Index>(i - 1)] = std::nan("");
+    const std::string word = i < words.size() ? words[i] : "";
+    const char *begin = word.data() + (word.starts_with('+') ? 1 : 0), *end = word.data() + word.size();
+    const auto parsed = std::from_chars(begin, end, value);
+    if (parsed.ec == std::errc() && parsed.ptr == end && std::isfinite(value)) continue;
+    throw InputError(fmt::format("{}: line {}: a vertex needs three finite numbers, and \"{}\" is none{}",
+                                 file.string(), line, word,
+                                 word.find(',') == std::string::npos ? "" : "; decimals are written with a point"));
+  }
+  return place;
+}
 
 void read_declaration(std::string_view comment, const std::filesystem::path& file, Declaration& declaration) {
   const std::vector<std::string> w = words(comment);
@@ -128,34 +114,11 @@ Declaration inspect_stl(const std::filesystem::path& file) {
     const std::vector<std::string> w = parted_by_blanks(line);
     if (w.empty()) continue;
     last = line;
-    if (w[0] == "vertex") check_coordinates(w, file, row);
+    if (w[0] == "vertex") read_coordinates(w, file, row);
   }
   const std::vector<std::string> w = words(last);
   if (w.empty() || w[0] != "endsolid")
     throw InputError(fmt::format("{}: cut short: an STL text ends with \"endsolid\"", file.string()));
-  return declaration;
-}
-
-Declaration inspect_obj(const std::filesystem::path& file) {
-  Declaration declaration;
-  long long vertices = 0;
-  std::string line;
-  long long read = 0;
-  for (std::ifstream in = open(file); std::getline(in, line);) {
-    ++read;
-    if (line.compare(0, 2, "v ") == 0) check_coordinates(parted_by_blanks(line), file, read), ++vertices;
-    if (line.compare(0, 1, "#") == 0) read_declaration(line, file, declaration);
-  }
-  if (vertices == 0) throw InputError(fmt::format("{}: has no vertices (lines that begin with v)", file.string()));
-  long long row = 0;
-  for (std::ifstream in = open(file); std::getline(in, line);) {
-    ++row;
-    if (line.compare(0, 2, "f ") != 0) continue;
-    const std::vector<std::string> w = words(line);
-    if (w.size() < 4)
-      throw InputError(fmt::format("{}: line {}: a face of {} corners (at least 3)", file.string(), row, w.size() - 1));
-    for (std::size_t i = 1; i < w.size(); ++i) check_obj_index(w[i], vertices, file, row);
-  }
   return declaration;
 }
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace supine::reconstruction {
 
@@ -18,10 +20,18 @@ struct Declaration {
 /// @throws InputError  naming @p file: another frame or unit, or one that contradicts an earlier comment
 void read_declaration(std::string_view comment, const std::filesystem::path& file, Declaration& declaration);
 
-/// Checks the text part of a file before the reader proper sees it, which does not notice such damage.
-/// @throws InputError  naming the line: wrong magic, no vertices, a vertex that is not three finite numbers, a face of
-///   two corners or that names a vertex there is not (OBJ), fewer bytes or lines than the header promises (STL)
+std::vector<std::string> parted_by_blanks(const std::string& line);
+
+/// Words 1 to 3 of a line: the coordinates of a vertex. Readers of other libraries stop at the comma of a decimal one,
+/// and say nothing.
+/// @throws InputError  naming @p file and @p line: one of them is no finite number
+Eigen::RowVector3d read_coordinates(const std::vector<std::string>& words, const std::filesystem::path& file,
+                                    long long line);
+
+/// Checks an STL file before the reader proper sees it, which does not notice such damage.
+/// @throws InputError  naming the line: wrong magic, a vertex that is not three finite numbers, fewer bytes or lines
+/// than
+///   the header promises
 Declaration inspect_stl(const std::filesystem::path& file);
-Declaration inspect_obj(const std::filesystem::path& file);
 
 }  // namespace supine::reconstruction

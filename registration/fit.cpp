@@ -15,7 +15,7 @@ namespace supine::registration {
 namespace {
 
 using StateMatrix = Eigen::Matrix<double, unknowns, unknowns>;
-constexpr int fit_points = 320, settle_iterations = 12, average_iterations = 4;
+constexpr int fit_points = 320, most_sorted_points = 20000, settle_iterations = 12, average_iterations = 4;
 constexpr double softness_sd = 0.3, rigid_length_mm = 40;
 constexpr double misfits_mm[] = {0.8, 1.6, 3.2, 6.4, 12.8}, lengths_mm[] = {15, 30, 60, 120};
 
@@ -157,6 +157,28 @@ class SoftSkin {
   std::optional<calibration::SurfaceDistance> skin_;
 };
 
+/// @p count of @p rows, drawn.
+std::vector<int> some_of(const std::vector<int>& rows, std::size_t count) {
+  std::vector<int> kept;
+  for (const int at : drawn_rows(static_cast<Eigen::Index>(rows.size()), static_cast<int>(count)))
+    kept.push_back(rows[static_cast<std::size_t>(at)]);
+  return kept;
+}
+
+/// Up to half of the points from what is rigid, however little of the scan it is: it says more than what deforms.
+std::vector<int> rows_to_fit(const Problem& problem, const RigidTransform& start) {
+  const std::vector<int> all = drawn_rows(problem.points.rows(), most_sorted_points);
+  if (!problem.target.skin || !problem.target.rigid) return some_of(all, fit_points);
+  const Matches matches = match(problem, all, start);
+  std::vector<int> rigid, soft;
+  for (std::size_t q = 0; q < all.size(); ++q) (matches.rigid[q] ? rigid : soft).push_back(all[q]);
+  std::vector<int> rows = some_of(rigid, fit_points / 2);
+  const std::vector<int> others = some_of(soft, fit_points - rows.size());
+  rows.insert(rows.end(), others.begin(), others.end());
+  std::sort(rows.begin(), rows.end());
+  return rows;
+}
+
 /// Points that say the same: each counts for less.
 Problem with_repeats(Problem problem) {
   const auto drawn = static_cast<double>(std::min<Eigen::Index>(fit_points, problem.points.rows()));
@@ -168,7 +190,7 @@ Problem with_repeats(Problem problem) {
 
 Fit fit(const Problem& given, const RigidTransform& start, const Belief& belief) {
   const Problem problem = with_repeats(given);
-  const std::vector<int> rows = drawn_rows(problem.points.rows(), fit_points);
+  const std::vector<int> rows = rows_to_fit(problem, start);
   const Eigen::RowVector3d centre = problem.points.colwise().mean();
   Fit found;
   found.transform = start;

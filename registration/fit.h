@@ -21,7 +21,8 @@ struct Belief {
   double shift_mm = 60, turn_rad = 0.5;
 };
 
-/// Generalised least squares of up to 320 matched points and the landmarks, with Gaussian errors
+/// Generalised least squares of up to 320 matched points (half of them of what is rigid, where so many are) and the
+/// landmarks, with Gaussian errors
 ///   noise²                                          of each point, white, times how many of them say the same, and
 ///   misfit² (n_i · n_j) κ(|x_i − x_j|/length)       of the body's shape against the prediction, κ Matérn 3/2,
 /// an isotropic random displacement field seen along the normals (landmarks: along each axis). What is rigid has the

@@ -56,8 +56,7 @@ Matches match(const Problem& problem, const std::vector<int>& rows, const RigidT
 double match_score_mm(const Matches& matches) {
   double sum = 0;
   for (Eigen::Index q = 0; q < matches.distance_mm.size(); ++q) {
-    const bool lost = matches.border[q] || !matches.facing[q];
-    const double distance = lost ? lost_mm : std::min(lost_mm, matches.distance_mm[q]);
+    const double distance = matches.facing[q] ? std::min(lost_mm, matches.distance_mm[q]) : lost_mm;
     sum += distance * distance;
   }
   return std::sqrt(sum / std::max<Eigen::Index>(1, matches.distance_mm.size()));
@@ -66,7 +65,7 @@ double match_score_mm(const Matches& matches) {
 double overlap(const Matches& matches) {
   int meeting = 0;
   for (Eigen::Index q = 0; q < matches.distance_mm.size(); ++q)
-    meeting += !matches.border[q] && matches.facing[q] && matches.distance_mm[q] < lost_mm;
+    meeting += matches.facing[q] && matches.distance_mm[q] < (matches.border[q] ? at_border_mm : lost_mm);
   return static_cast<double>(meeting) / std::max<Eigen::Index>(1, matches.distance_mm.size());
 }
 

@@ -302,6 +302,7 @@ bool Readings::fits_as_well(const std::optional<Reading>& other) const {
 
 Readings examine_readings(const calibration::Scan& scan, const std::vector<PoseShape>& shapes) {
   constexpr double clearly = 0.6;  // a stranger reading must fit that much better than one before it
+  constexpr double at_ease = 0.6;  // and than the scan itself does with the same freedom
   Bench bench(scan, shapes.front());
   Readings found{reading_of(bench.lay({}, as_given), "as given"),
                  mirrored_reading(bench, 0, "mirrored (x negated: left for right)"),
@@ -317,10 +318,9 @@ Readings examine_readings(const calibration::Scan& scan, const std::vector<PoseS
     consider(reading_of(other.lay({}, as_given), fmt::format("as a scan of the {} pose", shapes[s].pose)));
   }
   consider(shifted_reading(bench));
-  consider(found.mirrored);
-  consider(found.upended);
-  consider(turned_reading(bench, false));
-  consider(turned_reading(bench, true));
+  const double eased_mm = best_of_starts(bench, {}, turned).misfit_mm;
+  for (const auto& other : {found.mirrored, found.upended, turned_reading(bench, false), turned_reading(bench, true)})
+    if (other && other->misfit_mm < at_ease * eased_mm) consider(other);
   consider(resized_reading(bench));
   return found;
 }

@@ -100,6 +100,15 @@ void check_problem(const Problem& problem, const std::string& name) {
                     name, problem.landmarks.size()));
 }
 
+/// A start from which points that are rigid meet what is rigid. Landmarks on a skin that deforms are 10 mm off, and
+/// from there skin meets the sheet, sheet the skin, and the scan may slide away with all the weight of what is rigid.
+RigidTransform near_what_is_rigid(const Problem& problem, const RigidTransform& start, const Belief& belief) {
+  if (!problem.target.skin || !problem.target.rigid) return start;
+  Problem soft = problem;
+  soft.target.rigid = nullptr;
+  return fit(soft, start, belief).transform;
+}
+
 }  // namespace
 
 Registration register_scan(Problem problem, const RigidTransform& given, bool noise_known, const std::string& name) {
@@ -114,7 +123,7 @@ Registration register_scan(Problem problem, const RigidTransform& given, bool no
   if (!noise_known && has_surface(problem)) problem.noise_mm = noise_mm(problem, places.front().transform);
   found.noise_mm = problem.noise_mm;
   const Belief& belief = landmarks ? landmark_belief : given_belief;
-  found.fit = fit(problem, places.front().transform, belief);
+  found.fit = fit(problem, near_what_is_rigid(problem, places.front().transform, belief), belief);
   if (has_surface(problem)) {
     const std::vector<int> rows = drawn_rows(problem.points.rows(), judged_points);
     const Matches matches = match(problem, rows, found.fit.transform);

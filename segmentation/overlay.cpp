@@ -15,7 +15,7 @@
 namespace supine::segmentation {
 namespace {
 
-constexpr std::uint8_t air = 0, excluded = static_cast<std::uint8_t>(Tissue::excluded);
+constexpr std::uint8_t air = 0;
 // Right, down and away from the eye in patient LPS, per patient axis that is cut.
 const Eigen::Vector3d right_of[3] = {{0, 1, 0}, {1, 0, 0}, {1, 0, 0}};
 const Eigen::Vector3d down_of[3] = {{0, 0, -1}, {0, 0, -1}, {0, 1, 0}};

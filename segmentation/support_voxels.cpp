@@ -12,22 +12,24 @@
 namespace supine::segmentation {
 namespace {
 
-bool borders_on_tissue(const LabelImage& labels, int i, int j, int k) {
+/// Of the voxel's faces beyond which there is tissue.
+double contact_mm2(const LabelImage& labels, int i, int j, int k) {
+  double area = 0;
   for (const int step : {-1, 1})
     for (int axis = 0; axis < 3; ++axis) {
       Eigen::Vector3i at(i, j, k);
       at[axis] += step;
       if (labels.grid.contains(at.x(), at.y(), at.z()) &&
           is_meshed(static_cast<Tissue>(labels.at(at.x(), at.y(), at.z()))))
-        return true;
+        area += labels.grid.spacing_mm.prod() / labels.grid.spacing_mm[axis];
     }
-  return false;
+  return area;
 }
 
 struct Count {
   std::size_t voxels = 0;
   Eigen::Vector3i first = Eigen::Vector3i::Zero();
-  bool touches = false;
+  double contact_mm2 = 0;
 };
 
 std::vector<Count> count(const SupportVoxels& supports, const LabelImage& labels) {
@@ -40,7 +42,7 @@ std::vector<Count> count(const SupportVoxels& supports, const LabelImage& labels
         if (number == 0) continue;
         Count& of = counts[number - 1U];
         if (of.voxels++ == 0) of.first = {i, j, k};
-        of.touches = of.touches || borders_on_tissue(labels, i, j, k);
+        of.contact_mm2 += contact_mm2(labels, i, j, k);
       }
   return counts;
 }
@@ -86,8 +88,14 @@ void check_supports(const SupportVoxels& supports, const LabelImage& labels, con
       throw InputError(
           fmt::format("{}: support '{}' of [image.labels] has no voxel; correct its values, or take it out", file,
                       supports.names[s]));
-    if (counts[s].touches) continue;
+    if (counts[s].contact_mm2 >= smallest_contact_mm2) continue;
     const Eigen::Vector3d at = labels.grid.point(counts[s].first.cast<double>());
+    if (counts[s].contact_mm2 > 0)
+      throw InputError(
+          fmt::format("{}: support '{}' ({} voxels, first at ({:.1f}, {:.1f}, {:.1f}) mm) touches tissue on {:.3g} mm2 "
+                      "only; less than {:g} mm2 is noise of the labels. Label more of it, or list its values under air",
+                      file, supports.names[s], counts[s].voxels, at.x(), at.y(), at.z(), counts[s].contact_mm2,
+                      smallest_contact_mm2));
     throw InputError(
         fmt::format("{}: support '{}' holds nothing: none of its {} voxels (first at ({:.1f}, {:.1f}, {:.1f}) mm) "
                     "borders on tissue through a face; label what touches the body, or list its values under air",

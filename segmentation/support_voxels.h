@@ -18,6 +18,9 @@ struct LabelSupport {
 /// As many as one byte a voxel can number.
 inline constexpr std::size_t most_supports = 255;
 
+/// Contact with tissue on less than that is noise of the labels.
+inline constexpr double smallest_contact_mm2 = 20;
+
 /// Which voxels belong to which support.
 struct SupportVoxels {
   std::vector<std::string> names;    ///< empty: whatever is muscle is the one support
@@ -29,8 +32,8 @@ struct SupportVoxels {
 SupportVoxels mark_supports(const GreyImage& values, const std::vector<LabelSupport>& supports);
 
 /// @param file  for messages
-/// @throws InputError  a support without a voxel, or none of whose voxels borders on tissue that is meshed: its name,
-///   how many voxels it has, the first of them in mm
+/// @throws InputError  a support without a voxel, or whose voxels border on tissue that is meshed with no face or with
+///   faces of less than smallest_contact_mm2: its name, how many voxels it has, the first of them in mm
 void check_supports(const SupportVoxels& supports, const LabelImage& labels, const std::string& file);
 
 /// The support of the voxel whose centre is nearest to a point, of equally near ones the first.

@@ -12,7 +12,7 @@ const std::vector<OptionRow>& Effect::options() const {
   return none;
 }
 
-bool Effect::belongs_to(const meshing::TetMesh&, const meshing::Anatomy& anatomy) const {
+bool Effect::belongs_to(const meshing::TetMesh&, const meshing::Anatomy& anatomy, const Model&) const {
   return !(traits().breast_only && anatomy.is_object());
 }
 

@@ -32,13 +32,16 @@ struct OptionRow {
 };
 
 struct Layout;
+struct Model;
 
 /// What an effect may look at when it sets fields.
 struct Scene {
   const meshing::TetMesh& mesh;  ///< imaged
   const meshing::Anatomy& anatomy;
-  const Layout& layout;    ///< where the fields live
-  std::string pose;        ///< prone, supine, …
+  const Layout& layout;  ///< where the fields live
+  std::string pose;      ///< prone, supine, …
+  /// Of each named support: whether it is held by springs that do not let it slide (is_tied()); make_fields() fills it.
+  std::vector<bool> tied_supports = {};
   bool is_imaged() const;  ///< whether that is the pose the mesh was imaged in
 };
 
@@ -83,9 +86,9 @@ class Effect {
   virtual const std::vector<Parameter>& parameters() const = 0;
   virtual const std::vector<OptionRow>& options() const;
   virtual EffectTraits traits() const { return {}; }
-  /// Whether the body has what the effect is about (breasts, named parts, named supports); where it has not, the
-  /// effect is no candidate and nobody is told of it.
-  virtual bool belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy) const;
+  /// Whether the body, and how the model holds it, has what the effect is about (breasts, named parts, supports that do
+  /// not slide); where it has not, the effect is no candidate and nobody is told of it.
+  virtual bool belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model) const;
   /// How well the measurement is known in what this effect stands for, 1 sigma, in the unit of the parameters that have
   /// @p unit (empty: of its strength); 0 where errors of the measurement do not look like it.
   virtual double tolerance([[maybe_unused]] const std::string& unit,

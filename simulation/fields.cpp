@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/fields.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <mutex>
 
+#include "common/error.h"
 #include "meshing/anatomy.h"
 #include "meshing/supports.h"
 #include "meshing/tet_mesh.h"
@@ -128,6 +131,10 @@ Fields<double> each_entry(const Fields<Dual>& fields, const Part& part) {
 }  // namespace
 
 Layout make_layout(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy) {
+  if (anatomy.q.rows() != mesh.points.rows())
+    throw InputError(
+        fmt::format("the anatomy was computed on a mesh of {} points, this mesh has {}; compute it on this mesh",
+                    anatomy.q.rows(), mesh.points.rows()));
   return mesh.order() == 2 ? layout_of<Tri6>(mesh, anatomy) : layout_of<Tri3>(mesh, anatomy);
 }
 

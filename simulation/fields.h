@@ -104,7 +104,7 @@ struct Layout {
   std::shared_ptr<SkinOffsetOnce> skin_offset_once;
 };
 
-Layout make_layout(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy);
+Layout make_layout(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy);  ///< InputError: of another mesh
 
 /// The numbers without their derivatives, and the derivatives alone.
 Fields<double> values_of(const Fields<Dual>& fields);

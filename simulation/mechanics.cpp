@@ -101,12 +101,7 @@ Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anato
   terms_ = mesh.order() == 2 ? make_terms<Tet10, Tri6>(mesh, anatomy, model, layout_, *pattern_)
                              : make_terms<Tet4, Tri3>(mesh, anatomy, model, layout_, *pattern_);
   volume_ = dynamic_cast<const VolumeStrainTerm*>(terms_.front().get());
-  if (model.contact.kind != ContactKind::off) {
-    auto contact =
-        std::make_unique<SkinContactTerm>(rows_of(mesh.faces, layout_.skin.faces), mesh.points, model.contact);
-    contact_ = contact.get();
-    terms_.push_back(std::move(contact));
-  }
+  add_contact(model.contact);
   const auto hold_group = [this, &mesh](const FaceGroup& group) {
     for (const int face : group.faces)
       for (const int node : mesh.faces.row(face)) held_[node] = 1;
@@ -114,6 +109,28 @@ Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anato
   };
   if (model.interface.kind == InterfaceKind::fixed && mesh.support_names.empty()) hold_group(layout_.interface);
   if (model.cut.kind == CutKind::held) hold_group(layout_.cut);
+}
+
+void Mechanics::add_contact(const ContactSettings& settings) {
+  const Indices skin = rows_of(mesh_.faces, layout_.skin.faces);
+  if (settings.with_skin()) {
+    auto contact = std::make_unique<SkinContactTerm>(skin, mesh_.points, settings);
+    contact_ = contact.get();
+    terms_.push_back(std::move(contact));
+  }
+  if (!settings.with_chest()) return;
+  const std::optional<meshing::ChestBeside> chest = meshing::chest_beside(mesh_, anatomy_);
+  if (!chest)
+    throw InputError(
+        fmt::format("contact.kind = \"chest\" or \"all\" needs a chest beside the body: {}; take \"skin\" or \"off\"",
+                    anatomy_.is_object() ? "an object has none" : "here the skin is closed and ends nowhere"));
+  std::unique_ptr<ChestContact> contact;
+  if (mesh_.order() == 2)
+    contact = std::make_unique<ChestContactTerm<Tri6>>(skin, *pattern_, mesh_.points, *chest, settings);
+  else
+    contact = std::make_unique<ChestContactTerm<Tri3>>(skin, *pattern_, mesh_.points, *chest, settings);
+  chest_contact_ = contact.get();
+  terms_.push_back(std::move(contact));
 }
 
 bool Mechanics::has_energy() const {

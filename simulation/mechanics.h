@@ -7,6 +7,7 @@
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
 #include "simulation/model.h"
+#include "simulation/terms/chest_contact.h"
 #include "simulation/terms/skin_contact.h"
 #include "simulation/terms/volume_strain.h"
 
@@ -18,7 +19,8 @@ namespace supine::simulation {
 class Mechanics {
  public:
   /// @param mesh, anatomy  of the imaged shape; must outlive the object
-  /// @throws InputError  a law that does not go with the mesh, no interface, no skin
+  /// @throws InputError  a law that does not go with the mesh, no interface, no skin; contact with the chest of an
+  /// object or where the skin is closed
   Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model);
 
   const Layout& layout() const { return layout_; }
@@ -38,11 +40,14 @@ class Mechanics {
 
   /// Skin on skin; nullptr where the model leaves it off.
   const SkinContactTerm* contact() const { return contact_; }
+  /// Skin on the chest beside the breast; nullptr where the model leaves it off.
+  const ChestContact* chest_contact() const { return chest_contact_; }
 
   /// ∂r/∂p at frozen x and X, mN per unit of p; zero at held nodes.
   void parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const;
 
  private:
+  void add_contact(const ContactSettings& settings);
   void hold(const Demand& demand, Sums& sums) const;
 
   const meshing::TetMesh& mesh_;
@@ -50,9 +55,10 @@ class Mechanics {
   Layout layout_;
   std::unique_ptr<Pattern> pattern_;
   std::vector<std::unique_ptr<Term>> terms_;
-  const VolumeStrainTerm* volume_ = nullptr;  // one of the terms
-  const SkinContactTerm* contact_ = nullptr;  // one of the terms, if any
-  std::vector<char> held_;                    // per node
+  const VolumeStrainTerm* volume_ = nullptr;     // one of the terms
+  const SkinContactTerm* contact_ = nullptr;     // one of the terms, if any
+  const ChestContact* chest_contact_ = nullptr;  // the same
+  std::vector<char> held_;                       // per node
   bool any_held_ = false;
 };
 

@@ -28,7 +28,7 @@ enum class SkinLaw { neo_hookean, corotational };
 enum class Compression { tension_field, full };
 enum class InterfaceKind { sliding, elastic, fixed };
 enum class CutKind { elastic, held };
-enum class ContactKind { off, skin };
+enum class ContactKind { off, skin, chest, all };
 enum class DensityReference { imaged, undeformed };
 
 /// One [[effect]] of model.toml; parameter and option names are those of its catalogue entry.
@@ -38,11 +38,14 @@ struct EffectSetting {
   std::map<std::string, std::string> options;
 };
 
-/// Skin on skin (terms/skin_contact.h): a device that keeps skins apart, no belief, so its numbers are not calibrated.
+/// Skin on skin (terms/skin_contact.h), on the chest beside the breast (terms/chest_contact.h), or both: a device that
+/// keeps them apart, no belief, so its numbers are not calibrated.
 struct ContactSettings {
   ContactKind kind = ContactKind::off;
   double stiffness_kpa_per_mm = 2.0;  ///< > 0
   double band_mm = 1.0;               ///< > 0; gap at which the pressure sets in
+  bool with_skin() const { return kind == ContactKind::skin || kind == ContactKind::all; }
+  bool with_chest() const { return kind == ContactKind::chest || kind == ContactKind::all; }
 };
 
 /// How tissue is held on one support of an object; what is absent is that of [interface].

@@ -143,14 +143,18 @@ bool is_tied(InterfaceKind kind, const meshing::TetMesh& mesh) {
   return kind == InterfaceKind::elastic || (kind == InterfaceKind::fixed && !mesh.support_names.empty());
 }
 
-Fields<Dual> make_fields(const Model& model, const Scene& scene, const Eigen::Vector3d& gravity,
+Fields<Dual> make_fields(const Model& model, const Scene& given, const Eigen::Vector3d& gravity,
                          const std::string& varied) {
   for (const EffectSetting& setting : model.effects)
     if (find_effect(setting.name) == nullptr)
       throw InputError(fmt::format("effect '{}' is not in the catalogue", setting.name));
   if (!varied.empty() && find_parameter(varied) == nullptr)
     throw InputError(fmt::format("there is no parameter '{}' in the base model or the catalogue", varied));
-  Fields<Dual> fields = base_fields(model, scene, gravity, varied);
+  Fields<Dual> fields = base_fields(model, given, gravity, varied);
+  Scene scene = given;
+  scene.tied_supports.clear();
+  for (std::size_t s = 0; s < scene.mesh.support_names.size(); ++s)
+    scene.tied_supports.push_back(is_tied(kind_of_support(model, scene.mesh, static_cast<int>(s)), scene.mesh));
   for (const Effect* effect : catalogue()) {
     bool present = false;
     for (const EffectSetting& setting : model.effects)
@@ -177,9 +181,11 @@ void check_effects_act(const Model& model, const Scene& scene) {
       refuse(
           (scene.pose + " is the only pose and it acts between poses; give the case another one or remove the effect")
               .c_str());
-    if (effect != nullptr && !effect->belongs_to(scene.mesh, scene.anatomy))
+    if (effect != nullptr && !effect->belongs_to(scene.mesh, scene.anatomy, model))
       refuse(
-          "the body has not what it is about (a breast's anatomy, a named part, a named support); remove the effect");
+          "the body has not what it is about (a breast's anatomy, a named part, a named support that does not slide); "
+          "remove the "
+          "effect");
     const char* unread = nullptr;
     bool acts = false;
     for (const std::string& column : changed_columns(model, setting, scene)) {

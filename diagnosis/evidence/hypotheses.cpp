@@ -191,7 +191,7 @@ std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, c
 }
 
 void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& at,
-                  std::vector<Candidate>& candidates) {
+                  std::vector<Candidate>& candidates, bool keep_shapes) {
   const auto find_secant = [&](std::size_t c) {
     const auto& rows = candidates[c].parameters;
     const simulation::Parameter* row = simulation::find_parameter(rows[0].name);
@@ -203,9 +203,12 @@ void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, 
     model.effects.back().parameters[row->name].value = row->null + rest;
     try {
       calibration::Evaluator evaluator(scene, model, accurate_enough());
-      const calibration::Prediction moved = evaluator.predict(model, &at.fit.prediction.solution);
+      calibration::Prediction moved = evaluator.predict(model, &at.fit.prediction.solution);
       const auto there = calibration::residuals_of(scene, moved, at.fit.mask, base.noise_mm);
       candidates[c].secant = (usual / rest) * (there.distance_mm - at.fit.residuals.distance_mm);
+      candidates[c].secant_to = rest;
+      if (keep_shapes)
+        candidates[c].secant_at = std::make_shared<const simulation::ChainSolution>(std::move(moved.solution));
     } catch (const NumericalFailure&) {
       // No equilibrium at the usual size: the slope at the null has to do.
     }

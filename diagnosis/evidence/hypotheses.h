@@ -74,7 +74,8 @@ double inclusion(const std::vector<Hypothesis>& hypotheses, int effect);
 /// Change of the distances by the usual size of every candidate of one number that has one, solved with the model of
 /// a fit: Candidate::secant. Where a nuisance says some of it already, it is what the rest of it changes, as if
 /// all of it did.
+/// @param keep_shapes  in Candidate::secant_at
 void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& at,
-                  std::vector<Candidate>& candidates);
+                  std::vector<Candidate>& candidates, bool keep_shapes = false);
 
 }  // namespace supine::diagnosis

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/evidence/joint_fit.h"
 
+#include <algorithm>
 #include <numeric>
 
+#include "calibration/work_limit.h"
 #include "common/error.h"
 #include "common/rms.h"
 #include "diagnosis/evidence/base_fit.h"
@@ -66,10 +68,7 @@ void solve_first(calibration::Evaluator& evaluator, const std::vector<std::strin
 }  // namespace
 
 JointFitter::JointFitter(calibration::Evaluator& evaluator, JointFit& fit, const BaseFit& ground)
-    : evaluator_(evaluator), fit_(fit), ground_(ground) {
-  poses_.push_back(evaluator.scene().prone.name);
-  for (const auto* measurement : evaluator.scene().measurements) poses_.push_back(measurement->pose.name);
-}
+    : evaluator_(evaluator), fit_(fit), ground_(ground), poses_(poses_of(evaluator.scene())) {}
 
 JointTrial JointFitter::stepped(const VectorXd& step) const {
   const Index own = fit_.fit.u.size();
@@ -125,6 +124,7 @@ bool JointFitter::improve() {
   const double promised = before - objective_of(y + evidence.directions().columns * step, stepped(step));
   if (promised < settled) return false;
   const calibration::Fit kept = fit_.fit;
+  dearest_ = std::max(dearest_, kept.prediction.solution.work);
   const simulation::Model kept_model = fit_.model;
   for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
     fit_.fit.u = kept.u, fit_.nuisances = now.nuisances;
@@ -132,6 +132,7 @@ bool JointFitter::improve() {
     const simulation::ChainSolution near =
         calibration::extrapolated(kept.prediction.solution, kept.linearisation.by_coordinate, trial.u - kept.u);
     try {
+      const calibration::TrialLimit limit(evaluator_.chain(), dearest_);
       predict(trial, &near);
       if (objective() < before) return true;
     } catch (const NumericalFailure&) {

@@ -46,7 +46,8 @@ class JointFitter {
   void predict(const JointTrial& at, const simulation::ChainSolution* near);
   /// Slopes of parameters and nuisances at the prediction.
   std::unique_ptr<simulation::Sensitivities> linearise();
-  /// One step, shortened until F falls. @return  whether it did by more than a little
+  /// One step, shortened until F falls or a trial costs no more than it may (work_limit.h). @return  whether it did by
+  /// more than a little
   bool improve();
   /// Steps until none gains any more; slopes are those of the end.
   void descend(int most_steps, const std::function<void()>& before_step = {});
@@ -61,6 +62,7 @@ class JointFitter {
   JointFit& fit_;
   const BaseFit& ground_;
   std::vector<std::string> poses_;
+  int dearest_ = 0;  // work of the dearest prediction that was of use
 };
 
 }  // namespace supine::diagnosis

@@ -23,9 +23,21 @@ double log_sum(const Eigen::VectorXd& logs) {
 
 }  // namespace
 
+SizeBins size_bins(double scale_mm, double most_mm) {
+  SizeBins grid{Eigen::VectorXd(bins), Eigen::VectorXd(bins)};
+  const double ratio = std::pow(most_mm / finest_mm, 1.0 / (bins - 1));
+  double low = 0, high = finest_mm;
+  for (int b = 0; b < bins; ++b, low = high, high *= ratio) {
+    grid.sizes_mm[b] = b == 0 ? 0.5 * finest_mm : std::sqrt(low * high);
+    grid.prior[b] = half_cauchy_below(high, scale_mm) - half_cauchy_below(low, scale_mm);
+  }
+  grid.prior /= grid.prior.sum();
+  return grid;
+}
+
 ErrorCovariance::ErrorCovariance(const Eigen::MatrixXd& errors, const Eigen::MatrixXd& kernel, double scale_mm,
                                  double most_mm)
-    : factor_(errors), sizes_mm_(bins), size_prior_(bins) {
+    : factor_(errors), bins_(size_bins(scale_mm, most_mm)) {
   if (factor_.info() != Eigen::Success)
     throw NumericalFailure("the covariance of the scan's errors is not positive; are there points twice in the scan?");
   Eigen::MatrixXd white = factor_.matrixL().solve(kernel);
@@ -33,13 +45,6 @@ ErrorCovariance::ErrorCovariance(const Eigen::MatrixXd& errors, const Eigen::Mat
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(white);
   vectors_ = eigen.eigenvectors();
   lambda_ = eigen.eigenvalues().cwiseMax(0);
-  const double ratio = std::pow(most_mm / finest_mm, 1.0 / (bins - 1));
-  double low = 0, high = finest_mm;
-  for (int b = 0; b < bins; ++b, low = high, high *= ratio) {
-    sizes_mm_[b] = b == 0 ? 0.5 * finest_mm : std::sqrt(low * high);
-    size_prior_[b] = half_cauchy_below(high, scale_mm) - half_cauchy_below(low, scale_mm);
-  }
-  size_prior_ /= size_prior_.sum();
 }
 
 Eigen::MatrixXd ErrorCovariance::turned(const Eigen::MatrixXd& columns) const {

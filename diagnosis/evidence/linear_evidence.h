@@ -9,6 +9,13 @@
 
 namespace supine::diagnosis {
 
+/// A grid of sizes s of a discrepancy, and the prior mass of each of its bins; the first reaches down to 0.
+struct SizeBins {
+  Eigen::VectorXd sizes_mm, prior;
+};
+/// Of a half-Cauchy prior. @param scale_mm  of it  @param most_mm  where it ends
+SizeBins size_bins(double scale_mm, double most_mm);
+
 /// Errors that stand in every hypothesis, R, and a discrepancy of unknown size s, Σ_s = R + s² K, made diagonal for
 /// every s by one generalised eigenproblem K v = λ R v.
 class ErrorCovariance {
@@ -24,16 +31,16 @@ class ErrorCovariance {
   Eigen::VectorXd back(const Eigen::VectorXd& turned) const;
 
   const Eigen::VectorXd& lambda() const { return lambda_; }
-  /// The grid of s, and the prior mass of each of its bins; the first reaches down to 0.
-  const Eigen::VectorXd& sizes_mm() const { return sizes_mm_; }
-  const Eigen::VectorXd& size_prior() const { return size_prior_; }
+  const Eigen::VectorXd& sizes_mm() const { return bins_.sizes_mm; }
+  const Eigen::VectorXd& size_prior() const { return bins_.prior; }
   /// yᵀ Σ_s⁻¹ y
   double square(const Eigen::VectorXd& y, double size_mm) const;
 
  private:
   Eigen::LLT<Eigen::MatrixXd> factor_;
   Eigen::MatrixXd vectors_;
-  Eigen::VectorXd lambda_, sizes_mm_, size_prior_;
+  Eigen::VectorXd lambda_;
+  SizeBins bins_;
 };
 
 /// Numbers that distances depend on linearly, with independent normal priors, as offsets from where they stand. What

@@ -46,6 +46,12 @@ EffectSetting& setting_of(std::vector<EffectSetting>& settings, const std::strin
 
 }  // namespace
 
+std::vector<std::string> poses_of(const calibration::MeasuredScene& scene) {
+  std::vector<std::string> poses{scene.prone.name};
+  for (const auto* measurement : scene.measurements) poses.push_back(measurement->pose.name);
+  return poses;
+}
+
 std::vector<Nuisance> nuisances_of(const Model& model, const std::vector<std::string>& poses, const Priors& priors) {
   std::vector<Nuisance> list;
   for (const Effect* effect : simulation::catalogue()) {

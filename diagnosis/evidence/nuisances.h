@@ -24,6 +24,9 @@ struct Nuisance {
   std::string name() const { return pose + "/" + (effect.empty() ? "" : effect + ".") + parameter; }
 };
 
+/// The imaged pose, then the measured ones.
+std::vector<std::string> poses_of(const calibration::MeasuredScene& scene);
+
 /// All of them, at their null, without shapes. What the model fits itself, or an effect of it says once for all poses,
 /// is not there.
 std::vector<Nuisance> nuisances_of(const simulation::Model& model, const std::vector<std::string>& poses,

@@ -58,11 +58,12 @@ std::vector<Inclusion> included_in(const std::vector<Hypothesis>& hypotheses, co
 std::vector<OtherPrior> under_other_priors(const BaseFit& base, const std::vector<Hypothesis>& hypotheses,
                                            const std::vector<std::string>& effects,
                                            const std::vector<Inclusion>& included, const Unexplained& unexplained,
-                                           const Priors& priors) {
+                                           const Priors& priors, const std::vector<std::string>& unseen) {
   std::vector<OtherPrior> list;
   const auto add = [&](const std::string& what, const ErrorCovariance& errors, double factor) {
     const std::vector<Hypothesis> again = weighed_again(hypotheses, errors, factor);
-    list.push_back({what, decide(again, effects, included_in(again, effects, included, priors), unexplained, priors)});
+    list.push_back(
+        {what, decide(again, effects, included_in(again, effects, included, priors), unexplained, priors, unseen)});
   };
   add("strengths half as wide", *base.covariance, 0.5);
   add("strengths twice as wide", *base.covariance, 2);

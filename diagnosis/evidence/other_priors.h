@@ -23,6 +23,6 @@ struct OtherPrior {
 std::vector<OtherPrior> under_other_priors(const BaseFit& base, const std::vector<Hypothesis>& hypotheses,
                                            const std::vector<std::string>& effects,
                                            const std::vector<Inclusion>& included, const Unexplained& unexplained,
-                                           const Priors& priors);
+                                           const Priors& priors, const std::vector<std::string>& unseen);
 
 }  // namespace supine::diagnosis

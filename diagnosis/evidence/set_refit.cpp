@@ -169,12 +169,6 @@ simulation::EffectSetting free_setting(const std::string& name) {
 
 namespace {
 
-std::vector<std::string> poses_of(const calibration::MeasuredScene& scene) {
-  std::vector<std::string> poses{scene.prone.name};
-  for (const auto* measurement : scene.measurements) poses.push_back(measurement->pose.name);
-  return poses;
-}
-
 /// Numbers with nuisances as errors, then, where that leads far, with them.
 void fit_set(const calibration::MeasuredScene& scene, const BaseFit& base, const VectorXd& start,
              const simulation::ChainSolution* near, JointFit& joint, Hypothesis& h) {

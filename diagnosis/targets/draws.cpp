@@ -2,12 +2,14 @@
 #include "diagnosis/targets/draws.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "common/error.h"
 #include "common/statistics.h"
 #include "diagnosis/targets/moves.h"
+#include "simulation/parameters.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -28,9 +30,53 @@ simulation::Model model_at(const TargetQuestion& question, const calibration::Fr
   std::vector<Nuisance> nuisances = part.nuisances;
   for (std::size_t k = 0; k < nuisances.size(); ++k)
     nuisances[k].value += offset[part.u.size() + static_cast<Index>(k)];
-  return with_nuisances(free.model(free.clamped(part.u + offset.head(part.u.size()))), nuisances,
-                        {question.prone.name, question.pose.name});
+  simulation::Model model = with_nuisances(free.model(free.clamped(part.u + offset.head(part.u.size()))), nuisances,
+                                           {question.prone.name, question.pose.name});
+  const Index before = part.u.size() + static_cast<Index>(nuisances.size());
+  for (std::size_t k = 0; k < part.effects.size(); ++k) {
+    const double by = offset[before + static_cast<Index>(k)];
+    if (by == 0) continue;
+    const EffectNumber& number = part.effects[k];
+    if (model.effects.empty() || model.effects.back().name != number.effect)
+      model.effects.push_back(simulation::null_setting(*simulation::find_effect(number.effect)));
+    const simulation::Parameter& row = *simulation::find_parameter(number.parameter);
+    model.effects.back().parameters[row.name].value = std::clamp(number.null + by, row.lower, row.upper);
+  }
+  return model;
 }
+
+/// Draws offsets: a set of what is there, then its numbers.
+class Drawer {
+ public:
+  explicit Drawer(const ParameterPart& part) : part_(part) {
+    std::vector<double> weights;
+    for (const DirectionsOfSet& set : part.parts) {
+      weights.push_back(set.probability);
+      roots_.push_back(root_of(set.covariance));
+    }
+    which_ = std::discrete_distribution<std::size_t>(weights.begin(), weights.end());
+  }
+
+  VectorXd draw(std::mt19937_64& generator) {
+    std::normal_distribution<double> normal;
+    const std::size_t k = which_(generator);
+    VectorXd standard(roots_[k].cols());
+    for (double& number : standard) number = normal(generator);
+    VectorXd offset = VectorXd::Zero(part_.mean.size());
+    offset(part_.parts[k].rows) = part_.parts[k].mean + roots_[k] * standard;
+    const Index before = offset.size() - static_cast<Index>(part_.effects.size());
+    for (std::size_t e = 0; e < part_.effects.size(); ++e) {
+      double& number = offset[before + static_cast<Index>(e)];
+      if (part_.effects[e].least && number != 0) number = std::max(number, *part_.effects[e].least);
+    }
+    return offset;
+  }
+
+ private:
+  const ParameterPart& part_;
+  std::vector<MatrixXd> roots_;
+  std::discrete_distribution<std::size_t> which_;
+};
 
 /// Places of one point over the draws, against what the derivatives say.
 void summarise(Index point, const std::vector<VectorXd>& drawn, const VectorXd& middle, const MatrixXd& covariance,
@@ -69,16 +115,13 @@ DrawnPlaces draw_places(const TargetQuestion& question, const calibration::FreeP
     const Points places = points.at(x);
     return VectorXd(Eigen::Map<const VectorXd>(places.data(), places.size()));
   };
-  const MatrixXd root = root_of(part.covariance);
+  Drawer drawer(part);
   std::mt19937_64 generator(seed);
-  std::normal_distribution<double> normal;
   std::vector<VectorXd> drawn;
   DrawnPlaces result;
   for (result.draws = 0; result.draws < draws; ++result.draws) {
     if (progress) progress(result.draws);
-    VectorXd standard(root.cols());
-    for (double& number : standard) number = normal(generator);
-    const VectorXd offset = part.mean + root * standard;
+    const VectorXd offset = drawer.draw(generator);
     try {
       drawn.push_back(flat(at.chain.solve(model_at(question, free, part, offset), &at.solution).poses[0].x));
     } catch (const NumericalFailure&) {

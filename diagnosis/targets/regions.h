@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "calibration/expected_landmarks.h"
 #include "diagnosis/evidence/base_fit.h"
 #include "diagnosis/targets/conditioned.h"
+#include "diagnosis/targets/missing_effects.h"
 
 namespace supine::diagnosis {
 
@@ -18,21 +20,31 @@ struct Depth {
 
 /// What would make a region smaller, if it were known.
 struct Shrink {
-  std::string what;      ///< a parameter or nuisance by name, "marker on the nearest skin", or "scan " + a further pose
+  /// A parameter or nuisance by name, an effect that may be missing, "marker on the nearest skin", or "scan " + a
+  /// further pose.
+  std::string what;
   std::string in_words;  ///< "knowing where the supine scan lies, along x", "a marker on the nearest skin"
   double share;          ///< of the sum of the three variances that goes away
+};
+
+/// A place and the ellipsoid that holds it in 95 of 100 cases.
+struct Ellipsoid {
+  Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();      ///< its centre
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();    ///< mm²
+  Eigen::Vector3d half_axes_mm = Eigen::Vector3d::Zero();  ///< longest first
 };
 
 /// Where a point of the imaged body lies in a pose, and how sure that is.
 struct TargetRegion {
   std::string name;
-  Eigen::Vector3d model_mm;                ///< where the model has it
-  Eigen::Vector3d place_mm;                ///< the best guess with all that is known: centre of the ellipsoid
-  Eigen::Vector3d finer_mm;                ///< what finer elements would move it by
-  Eigen::Matrix3d covariance;              ///< mm²
-  Eigen::Vector3d half_axes_mm;            ///< of the 95 % ellipsoid, longest first
-  Eigen::Matrix3d axes;                    ///< its directions, columns
-  double outside_mm = 0;                   ///< of the point from the imaged body
+  Eigen::Vector3d model_mm;      ///< where the model has it
+  Eigen::Vector3d place_mm;      ///< the best guess with all that is known: centre of the ellipsoid
+  Eigen::Vector3d finer_mm;      ///< what finer elements would move it by
+  Eigen::Matrix3d covariance;    ///< mm²
+  Eigen::Vector3d half_axes_mm;  ///< of the ellipsoid that holds 95 % of all possibilities, longest first
+  Eigen::Matrix3d axes;          ///< its directions, columns
+  Ellipsoid if_nothing_missing;  ///< the same if it were known that nothing is missing; zero if that cannot be
+  double outside_mm = 0;         ///< of the point from the imaged body
   std::optional<Depth> nearest, straight;  ///< to the closest skin; against gravity
   std::vector<Shrink> shrinks;             ///< most first, up to six
 
@@ -41,30 +53,32 @@ struct TargetRegion {
 
 /// Landmarks that were measured in the pose, against where everything else that is known expects them.
 struct ExpectedLandmarks {
-  std::vector<std::string> names;
-  Points expected;             ///< #L by 3, mm, in the frame of the scan as given
-  Eigen::MatrixXd covariance;  ///< of measured less expected, 3 per landmark, their own errors included, mm²
-  double square = 0;           ///< of all of them by that covariance
-  double p_value = 1;          ///< of χ² with 3 degrees per landmark
+  calibration::ExpectedPlaces expected;  ///< in the frame of the scan as given
+  calibration::LandmarkAgreement agreement;
 };
 
-/// What of the places goes through parameters and nuisances, to first order.
+/// What of the places goes through numbers: parameters, nuisances, and those of effects that may be missing, to first
+/// order or along secants.
 struct ParameterPart {
-  Eigen::VectorXd u;                ///< coordinates of the free parameters where the model stands
-  std::vector<Nuisance> nuisances;  ///< where the model has them
-  Eigen::VectorXd mean;             ///< of the offsets of both, #z
-  Eigen::MatrixXd covariance;       ///< #z by #z
-  Eigen::MatrixXd moves;            ///< 3 #P by #z, mm
+  Eigen::VectorXd u;                   ///< coordinates of the free parameters where the model stands
+  std::vector<Nuisance> nuisances;     ///< where the model has them
+  std::vector<EffectNumber> effects;   ///< their numbers, as offsets from the null
+  Eigen::VectorXd mean;                ///< of the offsets of all, #z
+  Eigen::MatrixXd covariance;          ///< #z by #z
+  std::vector<DirectionsOfSet> parts;  ///< of which these are the moments
+  Eigen::MatrixXd moves;               ///< 3 #P by #z, mm
 };
 
 /// What all points of a call share.
 struct TargetRegions {
   std::vector<TargetRegion> points;
-  Eigen::MatrixXd covariance;  ///< of all places together, 3 per point
-  bool measured = false;       ///< whether a scan was taken into account
-  double unexplained_mm = 0;   ///< size of what no parameter explains: the likeliest, or without a scan the prior's
-  double mesh_mm = 0;          ///< 1 sigma of the mesh's error, each axis
-  bool mesh_measured = false;  ///< on other meshes; else it is a usual share of the way
+  Eigen::MatrixXd covariance;   ///< of all places together, 3 per point
+  bool measured = false;        ///< whether a scan was taken into account
+  double unexplained_mm = 0;    ///< size of what no parameter explains: the likeliest, or without a scan the prior's
+  double mesh_mm = 0;           ///< 1 sigma of the mesh's error, each axis
+  bool mesh_measured = false;   ///< on other meshes; else it is a usual share of the way
+  double unsettled_by = 0;      ///< largest step that a free parameter's coordinate would still make
+  std::vector<LikelySet> sets;  ///< the likeliest sets of missing effects; empty: it was taken that nothing is missing
   std::optional<ExpectedLandmarks> landmarks;
   ParameterPart parameters;
 };
@@ -79,14 +93,16 @@ struct TargetQuestion {
 };
 
 /// By what a scan leaves open: parameters, nuisances, uneven tissue, what no effect explains and the mesh, through the
-/// exact derivatives of the chain at @p base.
+/// exact derivatives of the chain at @p base, over all sets of effects that may be missing.
 /// @param evaluator  that base was fitted with
 /// @throws NumericalFailure  no equilibrium in the pose
 TargetRegions find_regions(const TargetQuestion& question, calibration::Evaluator& evaluator, const BaseFit& base,
-                           const Priors& priors);
+                           const MissingEffects& missing, const Priors& priors);
 
 /// By priors alone, where nothing was measured.
+/// @param may_lack  whether the model may lack effects; else it is taken that it lacks none
 /// @throws NumericalFailure  no equilibrium
-TargetRegions find_regions(const TargetQuestion& question, const simulation::Model& model, const Priors& priors);
+TargetRegions find_regions(const TargetQuestion& question, const simulation::Model& model, bool may_lack,
+                           const Priors& priors);
 
 }  // namespace supine::diagnosis

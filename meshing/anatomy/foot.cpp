@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/error.h"
+
 namespace supine::meshing {
 namespace {
 
@@ -133,6 +135,7 @@ Foot find_foot(const std::vector<SkinSample>& skin, const std::vector<Eigen::Vec
                const Eigen::Vector2d& start_mm) {
   double height = 0;
   for (const SkinSample& s : skin) height = std::max(height, s.thickness_mm);
+  if (!(height > 0)) throw InputError("no skin lies over the muscle: does the muscle's sheet face the breast?");
   Foot foot{start_mm, {}, 0};
   for (int round = 0; round < 12; ++round) {
     const std::vector<Polar> polar = to_polar(skin, foot.centre_mm);

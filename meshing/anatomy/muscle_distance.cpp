@@ -25,10 +25,6 @@ constexpr double sample_spacing_mm = 3, normal_smoothing_mm = 8;
 constexpr double third_weight_mm5 = 1.0e4, second_weight_mm3 = third_weight_mm5 / (120.0 * 120.0);
 
 void check(const reconstruction::Surface& sheet) {
-  if (sheet.triangles.rows() < 10) {
-    throw InputError(
-        fmt::format("the muscle sheet has {} triangles; the distance to it needs at least 10", sheet.triangles.rows()));
-  }
   double area = 0;
   for (Eigen::Index t = 0; t < sheet.triangles.rows(); ++t) {
     const Eigen::RowVector3d a = sheet.points.row(sheet.triangles(t, 0));
@@ -38,7 +34,9 @@ void check(const reconstruction::Surface& sheet) {
   }
   if (!(area > 100))
     throw InputError(fmt::format(
-        "the muscle sheet has an area of {:.3g} mm²; at least 100 mm² are needed (are its coordinates in mm?)", area));
+        "the sheet of the muscle or support has an area of {:.3g} mm²; sliding needs at least 100 mm² (are its "
+        "coordinates in mm? what is smaller can be held: kind = \"fixed\" or \"elastic\")",
+        area));
 }
 
 }  // namespace

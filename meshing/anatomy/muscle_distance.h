@@ -24,7 +24,7 @@ class MuscleDistance {
   /// @param sheet  breast-facing muscle sheet (open), normals toward the breast
   /// @param reach  box (rows: lower and upper corner, mm) in which φ is wanted; it is widened to hold the sheet and 40
   /// mm around it
-  /// @throws InputError  sheet with fewer than 10 triangles or of no area
+  /// @throws InputError  sheet of less than 100 mm²
   MuscleDistance(const reconstruction::Surface& sheet, const Eigen::Matrix<double, 2, 3>& reach);
 
   /// Outside the box the quadratic expansion at the closest point of the box is used.

@@ -89,8 +89,29 @@ void DecimateOptions::check() const {
                                    smallest_relative, largest_relative));
 }
 
+namespace {
+
+/// So short edges would take hours, and more memory than there is.
+void check_edges(const Surface& in, double edge_mm) {
+  if (edge_mm == 0) return;
+  constexpr double most_triangles = 2e6;
+  double area_mm2 = 0;
+  for (Eigen::Index t = 0; t < in.triangles.rows(); ++t) {
+    const Eigen::Vector3d a = in.points.row(in.triangles(t, 0)), b = in.points.row(in.triangles(t, 1)),
+                          c = in.points.row(in.triangles(t, 2));
+    area_mm2 += (b - a).cross(c - a).norm() / 2;
+  }
+  const double triangles = area_mm2 / (0.433 * edge_mm * edge_mm);  // √3/4 of the edge's square each
+  if (triangles > most_triangles)
+    throw InputError(fmt::format("edges of {:g} mm make {:.2g} triangles of this surface; at most {:g}: take {:.2g} mm",
+                                 edge_mm, triangles, most_triangles, std::sqrt(area_mm2 / (0.433 * most_triangles))));
+}
+
+}  // namespace
+
 DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
   options.check();
+  check_edges(in, options.edge_mm);
   if (options.sharp_deg > 0) return decimate_sharp(in, options);
   SoundSurface sound = require_sound(in, options.open ? Borders::allowed : Borders::closed, "the surface to decimate");
   if (options.relative_size.size() != 0 && options.relative_size.size() != in.points.rows())

@@ -171,7 +171,9 @@ void TetrahedraliseOptions::check() const {
     throw InputError(fmt::format("min_dihedral_deg is {}; it must lie in [0, 18]", min_dihedral_deg));
   }
   if (!(edge_mm >= 0)) throw InputError(fmt::format("edge_mm is {}; it must be >= 0", edge_mm));
-  if (cells != 0 && cells < 10) throw InputError(fmt::format("cells is {}; at least 10 are needed", cells));
+  constexpr std::size_t most_cells = 20'000'000;
+  if (cells != 0 && (cells < 10 || cells > most_cells))
+    throw InputError(fmt::format("cells is {}; it must lie in [10, {}]", cells, most_cells));
 }
 
 double mean_edge_mm(const Surface& surface) {

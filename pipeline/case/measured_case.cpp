@@ -48,11 +48,11 @@ std::vector<Pose> measured_poses(const Case& c) {
   return poses;
 }
 
-/// The least stiff of a few moduli from @p carries_kpa on that has an equilibrium: near the end of what a body carries
-/// one may stand on either side of a fold.
+/// The least stiff of a few moduli from twice the softest that carries the body on: that shape is crumpled and like
+/// nothing that is measured, and near the end of what a body carries one may stand on either side of a fold.
 void solve_stiffer(MeasuredCase& in, const std::vector<simulation::PoseLoad>& loads,
                    const simulation::CarryingModulus& found) {
-  constexpr double clear_of_the_end = 1.1, stiffer = 1.3, most = 4;
+  constexpr double clear_of_the_end = 2, stiffer = 1.3, most = 4;
   for (double factor = clear_of_the_end;; factor *= stiffer) {
     in.carrying_modulus_kpa = std::min(factor * found.carries_kpa, in.model.breast.young_modulus_kpa.upper);
     const simulation::Model model = in.begin_with(in.model);
@@ -133,6 +133,13 @@ auto of_landmarks(const Pose& pose, Work work) {
   }
 }
 
+/// Where the model as given has the landmarks of a pose.
+Points predicted_places(const MeasuredCase& in, const std::string& pose) {
+  const auto solved = std::find_if(in.start.poses.begin(), in.start.poses.end(),
+                                   [&pose](const simulation::PoseSolution& s) { return s.name == pose; });
+  return simulation::Embedding(in.mesh, in.landmarks.at(pose).imaged).at(solved->x);
+}
+
 void read_pose_landmarks(Run& run, MeasuredCase& in, const std::vector<Pose>& poses) {
   const Case& c = in.description;
   if (!c.prone_landmarks) return;
@@ -141,6 +148,8 @@ void read_pose_landmarks(Run& run, MeasuredCase& in, const std::vector<Pose>& po
     if (!pose.landmarks) continue;
     const Landmarks measured = read_landmarks(run.input(*pose.landmarks), c.frame);
     in.landmarks.emplace(pose.name, of_landmarks(pose, [&] { return calibration::pair_landmarks(imaged, measured); }));
+    const std::string doubt = calibration::doubt_of_scale(in.landmarks.at(pose.name), predicted_places(in, pose.name));
+    if (!doubt.empty()) run.warn(fmt::format("{}: {}", pose.landmarks->string(), doubt));
   }
 }
 
@@ -148,10 +157,8 @@ void read_pose_landmarks(Run& run, MeasuredCase& in, const std::vector<Pose>& po
 const calibration::MeasuredLandmarks* believable_landmarks(const MeasuredCase& in, const std::string& pose) {
   const auto found = in.landmarks.find(pose);
   if (found == in.landmarks.end()) return nullptr;
-  const auto solved = std::find_if(in.start.poses.begin(), in.start.poses.end(),
-                                   [&pose](const simulation::PoseSolution& s) { return s.name == pose; });
-  const Points predicted = simulation::Embedding(in.mesh, found->second.imaged).at(solved->x);
-  of_landmarks(in.description.pose(pose), [&] { calibration::check_landmarks(found->second, predicted); });
+  of_landmarks(in.description.pose(pose),
+               [&] { calibration::check_landmarks(found->second, predicted_places(in, pose)); });
   return &found->second;
 }
 

@@ -103,7 +103,15 @@ void read_contact(const TomlReader& file, Model& model) {
   const auto section = file.sub_table("contact");
   if (!section) return;
   simulation::ContactSettings& contact = model.contact;
-  read_choice<ContactKind>(section, "kind", {{"off", ContactKind::off}, {"skin", ContactKind::skin}}, contact.kind);
+  if (section->has("stiffness_kpa_per_mm") && !section->has("kind"))
+    section->fail("stiffness_kpa_per_mm",
+                  "acts with kind = \"skin\", \"chest\" or \"all\"; kind = \"off\" keeps it for later");
+  read_choice<ContactKind>(section, "kind",
+                           {{"off", ContactKind::off},
+                            {"skin", ContactKind::skin},
+                            {"chest", ContactKind::chest},
+                            {"all", ContactKind::all}},
+                           contact.kind);
   contact.stiffness_kpa_per_mm =
       section->number("stiffness_kpa_per_mm", {.lower = 1e-3, .upper = 1e3}).value_or(contact.stiffness_kpa_per_mm);
   contact.band_mm = section->number("band_mm", {.lower = 0.01, .upper = 5}).value_or(contact.band_mm);

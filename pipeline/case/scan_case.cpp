@@ -5,9 +5,11 @@
 
 #include <algorithm>
 
+#include "calibration/measured_landmarks.h"
 #include "calibration/surface_topology.h"
 #include "common/error.h"
 #include "common/suggestion.h"
+#include "pipeline/case/shape_gravity.h"
 #include "reconstruction/surface_io.h"
 
 namespace supine::pipeline {
@@ -37,7 +39,6 @@ void check_rigid_names(const Case& description, const Landmarks& measured) {
 
 /// Landmarks that the scan and the body share: rigid ones where the image has them, others where the model has them.
 void add_landmarks(const Case& description, const Pose& pose, const fs::path& shape, ScanCase& in) {
-  constexpr double usual_sigma_mm = 1;
   const Landmarks& measured = *in.landmarks;
   check_rigid_names(description, measured);
   const Landmarks imaged = read_landmarks(in.read.emplace_back(*description.prone_landmarks), description.frame);
@@ -49,10 +50,6 @@ void add_landmarks(const Case& description, const Pose& pose, const fs::path& sh
     const std::string& name = measured.names[l];
     const auto before = imaged.row_of(name), after = predicted.row_of(name);
     registration::Landmark shared{name, measured.points.row(static_cast<Eigen::Index>(l)), {}, Eigen::Vector3d::Zero()};
-    if (measured.sigma_mm.size() > 0)
-      shared.sigma_mm = measured.sigma_mm[static_cast<Eigen::Index>(l)];
-    else
-      shared.sigma_mm = usual_sigma_mm;
     shared.rigid = std::find(rigid.begin(), rigid.end(), name) != rigid.end();
     if (shared.rigid && before) {
       shared.image = imaged.points.row(*before);
@@ -62,6 +59,7 @@ void add_landmarks(const Case& description, const Pose& pose, const fs::path& sh
     } else {
       continue;
     }
+    shared.sigma_mm = calibration::pair_sigma_mm(imaged, *before, measured, static_cast<Eigen::Index>(l));
     in.problem.landmarks.push_back(shared);
   }
   if (in.problem.landmarks.empty())
@@ -112,7 +110,8 @@ ScanCase read_scan_case(const Case& description, const Pose& pose, const fs::pat
                     shape.string()));
   ScanCase in;
   choose(description, pose, in);
-  in.predicted = meshing::read_pose(in.read.emplace_back(shape));
+  in.predicted = meshing::read_pose(in.read.emplace_back(shape), pose.name);
+  check_gravity(shape, pose);
   in.scan = reconstruction::read_surface(in.read.emplace_back(*pose.surface), description.frame);
   if (pose.landmarks) in.landmarks = read_landmarks(in.read.emplace_back(*pose.landmarks), description.frame);
   add_surfaces(in, shape);

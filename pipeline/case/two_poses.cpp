@@ -5,6 +5,7 @@
 
 #include "common/error.h"
 #include "meshing/topology.h"
+#include "pipeline/case/shape_gravity.h"
 #include "simulation/solve/folds.h"
 
 namespace supine::pipeline {
@@ -20,7 +21,8 @@ meshing::PoseMesh read_shape(Run& run, const Case& measured, const fs::path& fol
         fmt::format("{} is not there: the shape in pose '{}' was not computed; run make CASE={} simulate, "
                     "or name the folder of the shapes with --dir",
                     file.string(), pose, measured.folder.string()));
-  return meshing::read_pose(run.input(file));
+  if (pose != "undeformed") check_gravity(file, measured.pose(pose));
+  return meshing::read_pose(run.input(file), pose);
 }
 
 void warn_of_inverted(Run& run, const Indices& cells, const Points& shape, const std::string& pose) {

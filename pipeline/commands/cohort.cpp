@@ -34,11 +34,11 @@ class CohortTool : public Tool {
     app.add_option("--results", results_, "where results are: RESULTS/NAME (default: COHORT/NAME/out)");
     app.add_option("--shared-mm", options_.shared_mm,
                    "the model's own error that all patients share, 1 sigma along an effect, mm RMS over the scan")
-        ->check(CLI::Range(0.0, 10.0))
+        ->check(within(0, 10))
         ->capture_default_str();
     app.add_option("--prior-probability", options_.prior_probability,
                    "of each effect, before anything is measured: that some patients have it")
-        ->check(CLI::Range(1e-6, 1 - 1e-6))
+        ->check(within(1e-6, 1 - 1e-6))
         ->capture_default_str();
   }
 

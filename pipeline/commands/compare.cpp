@@ -15,6 +15,7 @@
 #include "pipeline/case/case.h"
 #include "pipeline/case/model_file.h"
 #include "pipeline/case/scan_readings.h"
+#include "pipeline/case/shape_gravity.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/results/targets_report.h"
 #include "pipeline/tool/tool.h"
@@ -122,7 +123,8 @@ class CompareTool : public Tool {
                       "in [pose.{}]",
                       (case_folder_ / "case.toml").string(), inputs.pose.name, inputs.pose.name));
     }
-    inputs.predicted = meshing::read_pose(run.input(pose_file_));
+    inputs.predicted = meshing::read_pose(run.input(pose_file_), pose_name_.empty() ? inputs.pose.name : "");
+    check_gravity(pose_file_, inputs.pose);
     inputs.surface = reconstruction::read_surface(run.input(*inputs.pose.surface), inputs.measured.frame);
     if (!model_file_.empty()) inputs.model = read_model(run.input(model_file_));
     return inputs;
@@ -136,7 +138,7 @@ class CompareTool : public Tool {
     for (const Pose& other : inputs.measured.poses) {
       const fs::path file = pose_file_.parent_path() / (other.name + ".vtu");
       if (other.name == inputs.pose.name || other.name == "prone" || !fs::exists(file)) continue;
-      shapes.push_back(meshing::read_pose(file));
+      shapes.push_back(meshing::read_pose(file, other.name));
       others.push_back({other.name, &shapes.back().positions});
     }
     check_scan(run, inputs.measured, inputs.pose, scan, inputs.predicted.mesh, skin, inputs.predicted.positions,

@@ -145,6 +145,12 @@ class DecimateTool : public Tool {
     for (const std::string& text : finer_) {
       const std::vector<double> values = numbers(text);
       const Eigen::RowVector3d centre(values[0], values[1], values[2]);
+      const double nearest_mm = (in.points.rowwise() - centre).rowwise().norm().minCoeff();
+      if (nearest_mm > 2 * values[3])
+        throw InputError(
+            fmt::format("--finer {}: the surface lies {:.0f} mm from there, and edges change within {:g} mm; "
+                        "are these its millimetres?",
+                        text, nearest_mm, 2 * values[3]));
       for (Eigen::Index p = 0; p < sizes.size(); ++p) {
         // Twice the radius away the common size is reached again.
         const double away = ((in.points.row(p) - centre).norm() - values[3]) / values[3];

@@ -44,15 +44,15 @@ class DiagnoseTool : public Tool {
     app.add_option("--registration-mm", options_.known.registration_mm,
                    "how well each scan's place is known, 1 sigma per direction, mm; its turn goes with it, 0.75 "
                    "degrees per mm (default: registration_mm of the case, else 2). 0.3 where markers were used")
-        ->check(not_below_zero());
+        ->check(within(0, 50));
     app.add_option("--segmentation-mm", options_.known.segmentation_mm,
                    "how well the imaged skin's place is known, 1 sigma, mm (default: segmentation_mm of the case, "
                    "else 0.3)")
-        ->check(not_below_zero());
+        ->check(within(0, 50));
     app.add_option("--chest-wall-mm", options_.known.chest_wall_mm,
                    "how far breath may move the muscle between two scans, 1 sigma, mm (default: breath_mm of the "
                    "case, else 1)")
-        ->check(not_below_zero());
+        ->check(within(0, 50));
     app.add_option("--prior", options_.prior_of_sets,
                    "probabilities, before anything is measured, that nothing, one, two and three effects are missing: "
                    "four numbers > 0 that add up to 1 (default: 0.5,0.3,0.15,0.05)")

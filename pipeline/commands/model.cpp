@@ -93,7 +93,10 @@ class ModelTool : public Tool {
       if (simulation::why_not_of(model, row.name).empty())
         say(row.name.c_str(), simulation::base_setting(model, row.name));
     if (model.contact.kind != simulation::ContactKind::off) {
-      run.say("contact of skin with skin");
+      run.say(model.contact.kind == simulation::ContactKind::skin ? "contact of skin with skin"
+              : model.contact.kind == simulation::ContactKind::chest
+                  ? "contact of skin with the chest beside the breast"
+                  : "contact of skin with skin and with the chest beside the breast");
       run.say(fmt::format("  {:<36}{}", "contact.stiffness_kpa_per_mm", model.contact.stiffness_kpa_per_mm));
       run.say(fmt::format("  {:<36}{}", "contact.band_mm", model.contact.band_mm));
     }

@@ -53,7 +53,9 @@ class PhantomTool : public Tool {
         "--prior", options_.prior,
         "effects, nuisances and what no effect explains drawn from their priors; excludes --effect, --outside, "
         "--size and --realistic");
-    app.add_option("--seed", options_.seed, "of body, sizes, noise and holes")->capture_default_str();
+    app.add_option("--seed", options_.seed, "of body, sizes, noise and holes")
+        ->check(not_below_zero())
+        ->capture_default_str();
     app.add_flag("--tilt", options_.tilt, "also a scan of the body tilted by 45 degrees");
     app.add_option("--noise-mm", options_.noise_mm, "scanner noise along the normal, 1 sigma, 0 to 5")
         ->capture_default_str();

@@ -63,6 +63,8 @@ class ReconstructTool : public Tool {
     run.stage("read");
     const segmentation::LabelImage image = segmentation::read_labels(run.input(labels_));
     options_.cut = cut_rules();
+    const segmentation::LabelNotes notes = segmentation::read_label_notes(labels_);
+    object_ = notes.contains("side") && notes.at("side") == "none";
     if (smooth_mm_) options_.smooth_mm = *smooth_mm_;
     run.stage("reconstruct");
     run.progress("making surfaces");
@@ -140,7 +142,10 @@ class ReconstructTool : public Tool {
     return rules;
   }
 
-  static void write(Run& run, const Reconstruction& made, const fs::path& folder) {
+  const char* body_word() const { return object_ ? "body" : "breast"; }
+  const char* support_word() const { return object_ ? "supports" : "muscle"; }
+
+  void write(Run& run, const Reconstruction& made, const fs::path& folder) const {
     const fs::path breast = folder / "breast.vtp", muscle = folder / "muscle.vtp";
     reconstruction::write_surface(made.breast.surface, run.output(breast));
     run.figures(breast) = figures(made.breast);
@@ -149,7 +154,7 @@ class ReconstructTool : public Tool {
     const auto report = reconstruction::check_surface(made.muscle);
     run.figures(muscle) = {
         {"triangles", report.triangles}, {"area_cm2", report.area_mm2 / 100}, {"components", report.components}};
-    run.say(fmt::format("{:<10}{:>10} triangles, {:.1f} cm2", "muscle", report.triangles, report.area_mm2 / 100));
+    run.say(fmt::format("{:<10}{:>10} triangles, {:.1f} cm2", support_word(), report.triangles, report.area_mm2 / 100));
     for (const OrganSurface& organ : made.organs) {
       const fs::path file = folder / (organ.name + ".vtp");
       reconstruction::write_surface(organ.surface, run.output(file));
@@ -185,8 +190,9 @@ class ReconstructTool : public Tool {
     return json;
   }
 
-  static void say(const Run& run, const OrganSurface& organ) {
-    run.say(fmt::format("{:<10}{:>10} triangles, {:.2f} ml ({:+.3f} % of the voxels), {} piece(s)", organ.name,
+  void say(const Run& run, const OrganSurface& organ) const {
+    const std::string name = organ.name == "breast" ? body_word() : organ.name;
+    run.say(fmt::format("{:<10}{:>10} triangles, {:.2f} ml ({:+.3f} % of the voxels), {} piece(s)", name,
                         organ.report.triangles, organ.report.volume_mm3 / 1000, 100 * organ.volume_error(),
                         organ.report.components - organ.report.cavities));
     if (organ.name != "breast") return;
@@ -195,16 +201,16 @@ class ReconstructTool : public Tool {
                           organ.report.region_area_mm2[static_cast<int>(region)] / 100));
   }
 
-  static Outcome judge(Run& run, const Reconstruction& made) {
+  Outcome judge(Run& run, const Reconstruction& made) const {
     if (made.breast.dropped_pieces > 0)
       run.warn(fmt::format("{} loose bits of tissue were left out, {:.2f} ml together", made.breast.dropped_pieces,
                            made.breast.dropped_volume_mm3 / 1000));
     if (made.breast.perforator_volume_mm3 > 0)
-      run.warn(fmt::format("{:.2f} ml of thin tissue inside the muscle were counted as muscle",
-                           made.breast.perforator_volume_mm3 / 1000));
+      run.warn(fmt::format("{:.2f} ml of thin tissue inside the {} were counted as {}",
+                           made.breast.perforator_volume_mm3 / 1000, support_word(), support_word()));
     if (made.breast.report.cavities > 0)
-      run.warn(fmt::format("the breast encloses {} cavities of air, muscle or excluded tissue",
-                           made.breast.report.cavities));
+      run.warn(fmt::format("the {} encloses {} cavities of air, {} or excluded tissue", body_word(),
+                           made.breast.report.cavities, support_word()));
     for (const OrganSurface& organ : made.organs)
       if (std::abs(organ.volume_error()) > good_volume_error)
         run.warn(
@@ -213,13 +219,14 @@ class ReconstructTool : public Tool {
                         organ.name, -100 * organ.volume_error()));
     if (std::abs(made.breast.volume_error()) <= good_volume_error) return Outcome::done;
     run.warn(
-        fmt::format("the breast's volume differs by {:+.2f} % from its voxels (aimed at: within 1 %); give a smaller "
+        fmt::format("the {}'s volume differs by {:+.2f} % from its voxels (aimed at: within 1 %); give a smaller "
                     "--smooth-mm",
-                    100 * made.breast.volume_error()));
+                    body_word(), 100 * made.breast.volume_error()));
     return Outcome::target_not_met;
   }
 
   std::string labels_;
+  bool object_ = false;  // the labels are of a body that is no breast
   std::optional<double> smooth_mm_, rim_mm_;
   std::vector<std::string> cut_;
   reconstruction::ReconstructOptions options_;

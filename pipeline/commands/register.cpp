@@ -212,7 +212,11 @@ class RegisterTool : public Tool {
           "the {} {} ({:.2f}, {:.2f}, {:.2f}) is known to ± {:.1f} {} only (1 sd): the shape does not fix it",
           weak.turn ? "turn about" : "shift along", "the axis", weak.axis.x(), weak.axis.y(), weak.axis.z(),
           weak.turn ? weak.sd * degrees : weak.sd, weak.turn ? "degrees" : "mm"));
-    if (!found.worse_than_given()) return Outcome::done;
+    if (!found.worse_than_given()) {
+      if (found.given_inside)
+        run.say("  the 95 % region holds the place as given as well: the scan does not say that it lies elsewhere");
+      return Outcome::done;
+    }
     const std::string figures =
         fmt::format("RMS {:.2f} mm before, {:.2f} after; landmarks {:.2f} before, {:.2f} after", found.before_mm,
                     found.after_mm, found.landmarks_before_mm, found.landmarks_after_mm);

@@ -114,8 +114,8 @@ class SegmentTool : public Tool {
     run.progress("counting components");
     findings.components = segmentation::count_components(labels);
     if (findings.components.meshed > 1)
-      run.warn(fmt::format("the tissue lies in {} separate pieces; each needs muscle or a cut to hold it",
-                           findings.components.meshed));
+      run.warn(fmt::format("the tissue lies in {} separate pieces; each needs {} or a cut to hold it",
+                           findings.components.meshed, measured.is_object() ? "a support" : "muscle"));
     if (!truth_file_.empty()) findings.dice = compare_with_truth(measured, labels, run);
     run.stage("write");
     const fs::path target = output.empty() ? fs::path(case_folder_) / "out" / "labels.vti" : output;

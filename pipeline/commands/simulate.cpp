@@ -146,7 +146,7 @@ class SimulateTool : public Tool {
         "{} (bound {} mm). {}", what, landmark_bound_mm,
         other <= landmark_bound_mm ? "With x and y negated all lie inside: the file is RAS and case.frame says LPS, or "
                                      "the other way round"
-                                   : "Check its unit (mm), its frame, and that it was marked in the prone image"));
+                                   : "Check its unit (mm), its frame, and that it was marked in the image itself"));
   }
 
   void write(Run& run, const CaseInputs& in, const Simulated& simulated) const {

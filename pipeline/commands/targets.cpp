@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <numeric>
@@ -92,6 +93,12 @@ class TargetsTool : public Tool {
                    "hold the part of parameters and nuisances against that many draws through the whole chain")
         ->check(CLI::Range(2, 100000));
     app.add_option("--seed", seed_, "of the draws")->capture_default_str();
+    app.add_option("--diagnosis", diagnosis_file_,
+                   "diagnosis.json of the case: sets of effects are as likely as it says (default: as straight lines "
+                   "at the fit have them)");
+    app.add_flag(
+        "--nothing-missing", nothing_missing_,
+        "take it that the model lacks nothing: regions of a model that does lack something are then too small");
     app.add_flag("--no-other-meshes", no_other_meshes_,
                  "do not solve on other meshes: the error of the mesh is then a usual share of the way");
     app.add_flag("--no-further-scans", no_further_scans_, "do not weigh scans of further poses");
@@ -101,6 +108,12 @@ class TargetsTool : public Tool {
     run.stage("read");
     run.input(case_folder_ / "case.toml");
     const Case description = read_case(case_folder_);
+    if (nothing_missing_ && !diagnosis_file_.empty())
+      throw InputError("--nothing-missing and --diagnosis contradict each other; give one of them");
+    if (!diagnosis_file_.empty() && !has_scan(description))
+      throw InputError(fmt::format("--diagnosis {}: no pose of the case has a scan, so there is nothing it can be of",
+                                   diagnosis_file_.string()));
+    if (!diagnosis_file_.empty()) told_ = read_likely_sets(run.input(diagnosis_file_));
     for (const std::string& pose : wanted(description)) run.output(table(pose));
     return has_scan(description) ? by_scan(run) : by_priors(run, description);
   }
@@ -138,12 +151,13 @@ class TargetsTool : public Tool {
     run.stage("fit");
     const diagnosis::BaseFit base =
         diagnosis::fit_base_model(evaluator, subject.given, subject.start, subject.noise_mm, subject.near, options);
+    const diagnosis::MissingEffects missing = may_be_missing(run, live, evaluator, base, options.priors);
     for (const std::string& pose : wanted(measured->description)) {
       run.stage("regions " + pose);
       live.show("regions in " + pose);
       const TargetQuestion question =
           question_of(measured->description, measured->mesh, measured->anatomy, targets, pose);
-      const TargetRegions regions = diagnosis::find_regions(question, evaluator, base, options.priors);
+      const TargetRegions regions = diagnosis::find_regions(question, evaluator, base, missing, options.priors);
       warn_of_unsettled(run, regions);
       warn_of_landmarks(run, regions, pose);
       write(run, question, regions, *base.parameters, &base.fit.prediction.solution);
@@ -151,10 +165,25 @@ class TargetsTool : public Tool {
     return left_out_ ? Outcome::target_not_met : Outcome::done;
   }
 
+  /// What the model may lack, by the scan, or by a diagnosis of it.
+  diagnosis::MissingEffects may_be_missing(Run& run, LiveProgress& live, calibration::Evaluator& evaluator,
+                                           const diagnosis::BaseFit& base, const diagnosis::Priors& priors) const {
+    if (nothing_missing_) return {};
+    run.stage("effects");
+    live.show("effects that may be missing");
+    diagnosis::MissingEffects missing = diagnosis::screen_effects(evaluator, base, priors);
+    if (!told_) return missing;
+    const auto unknown = diagnosis::weigh_as(*told_, base.parameters->base(), missing);
+    if (!unknown.empty())
+      throw InputError(fmt::format("{}: speaks of {}, which this body and its scans cannot have; is it of this case?",
+                                   diagnosis_file_.string(), fmt::join(unknown, ", ")));
+    return missing;
+  }
+
   /// A fit that stopped on its way has its optimum elsewhere, where derivatives may be others.
   static void warn_of_unsettled(Run& run, const TargetRegions& regions) {
     constexpr double settled = 0.2;  // of a coordinate, about a fifth of a modulus
-    const double off = regions.parameters.mean.head(regions.parameters.u.size()).cwiseAbs().maxCoeff();
+    const double off = regions.unsettled_by;
     if (off > settled)
       run.warn(
           fmt::format("the fit has not settled: a parameter would go on by {:.2g} of its logarithm. Regions are to "
@@ -165,12 +194,12 @@ class TargetsTool : public Tool {
   /// Where measured landmarks lie otherwise than all else allows, so may everything between them.
   static void warn_of_landmarks(Run& run, const TargetRegions& regions, const std::string& pose) {
     constexpr double unlikely = 0.01;
-    if (!regions.landmarks || regions.landmarks->p_value >= unlikely) return;
+    if (!regions.landmarks || regions.landmarks->agreement.p_value >= unlikely) return;
     run.warn(
         fmt::format("landmarks in {} lie where all else that is known does not have them (p = {:.2g}, bound {}): "
                     "regions there are too small. Either the landmarks are wrong or the model lacks something; "
                     "supine-diagnose asks what, and its model is given with --model",
-                    pose, regions.landmarks->p_value, unlikely));
+                    pose, regions.landmarks->agreement.p_value, unlikely));
   }
 
   Outcome by_priors(Run& run, const Case& description) {
@@ -186,7 +215,7 @@ class TargetsTool : public Tool {
     for (const std::string& pose : wanted(description)) {
       run.stage("regions " + pose);
       const TargetQuestion question = question_of(description, mesh, anatomy, targets, pose);
-      write(run, question, diagnosis::find_regions(question, given, priors), free, nullptr);
+      write(run, question, diagnosis::find_regions(question, given, !nothing_missing_, priors), free, nullptr);
     }
     return left_out_ ? Outcome::target_not_met : Outcome::done;
   }
@@ -252,6 +281,13 @@ class TargetsTool : public Tool {
   Targets inside(Run& run, const meshing::TetMesh& mesh, const Targets& all, const std::string& from) {
     Points places(static_cast<Eigen::Index>(all.places.size()), 3);
     for (std::size_t p = 0; p < all.places.size(); ++p) places.row(static_cast<Eigen::Index>(p)) = all.places[p];
+    const double spread_mm = (places.colwise().maxCoeff() - places.colwise().minCoeff()).norm();
+    constexpr double least_spread_mm = 0.5;
+    if (places.rows() > 1 && spread_mm < least_spread_mm)
+      throw InputError(
+          fmt::format("{}: its {} points lie within {:.2g} mm of each other (bound {:g} mm). In metres? "
+                      "Write mm",
+                      from, places.rows(), spread_mm, least_spread_mm));
     const Eigen::VectorXd outside = simulation::Embedding(mesh, places).outside_mm();
     if (outside.minCoeff() > warp::on_surface_mm) {
       Points turned = places;
@@ -277,12 +313,13 @@ class TargetsTool : public Tool {
     return kept;
   }
 
-  fs::path case_folder_, mesh_file_, model_file_;
+  fs::path case_folder_, mesh_file_, model_file_, diagnosis_file_;
   std::vector<fs::path> points_;
   std::vector<std::string> poses_;
+  std::optional<std::vector<diagnosis::LikelySet>> told_;  // by the diagnosis
   std::optional<int> draws_;
   unsigned seed_ = 1;
-  bool no_other_meshes_ = false, no_further_scans_ = false, left_out_ = false;
+  bool no_other_meshes_ = false, no_further_scans_ = false, left_out_ = false, nothing_missing_ = false;
 };
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "meshing/mesh_io.h"
 #include "meshing/quality.h"
 #include "meshing/supports.h"
+#include "meshing/surface/sheet_check.h"
 #include "meshing/tetrahedra/curve.h"
 #include "meshing/tetrahedra/grade.h"
 #include "meshing/tetrahedra/ligament_ring.h"
@@ -128,6 +129,12 @@ class TetrahedraliseTool : public Tool {
     run.stage("read");
     reconstruction::Surface surface = reconstruction::read_surface(run.input(surface_));
     const reconstruction::Surface muscle = reconstruction::read_surface(run.input(muscle_));
+    if (muscle.region.size() > 0)
+      throw InputError(
+          fmt::format("{}: has regions: it is the surface of the body, not that of the muscle; "
+                      "supine-reconstruct writes both",
+                      muscle_));
+    meshing::check_sheet(surface, muscle, muscle_);
     segmentation::LabelImage labels;
     if (!body) labels = segmentation::read_labels(run.input(labels_));
     findings.side = body ? body->side : find_side();
@@ -255,10 +262,15 @@ class TetrahedraliseTool : public Tool {
 
   std::string find_side() const {
     std::string side = side_, from = "--side";
+    const segmentation::LabelNotes notes = segmentation::read_label_notes(labels_);
     if (side.empty()) {
-      const segmentation::LabelNotes notes = segmentation::read_label_notes(labels_);
       side = notes.contains("side") ? notes.at("side") : "left";
       from = labels_;
+    } else if (notes.contains("side") && notes.at("side") != side) {
+      throw InputError(
+          fmt::format("--side {}: {} is of side \"{}\", as its case says; leave --side out, or correct "
+                      "side in case.toml and segment again",
+                      side, labels_, notes.at("side")));
     }
     if (side != "left" && side != "right" && side != "both" && side != "none") {
       throw InputError(

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/error.h"
 #include "pipeline/case/case_volume.h"
 #include "pipeline/case/two_poses.h"
+#include "pipeline/case/volume_checks.h"
 #include "pipeline/tool/tool.h"
 #include "warp/carry_points.h"
 #include "warp/displacement.h"
@@ -72,8 +74,8 @@ class WarpTool : public Tool {
            "shapes).\n\n"
            "Examples:\n"
            "  supine-warp mycase --pose supine\n"
-           "  supine-warp mycase pet.nii.gz --labels lesions.seg.nrrd --spacing 1\n"
-           "  supine-warp mycase ultrasound.nrrd --from supine --to prone --like mycase/mri.nrrd\n"
+           "  supine-warp mycase pet.nii.gz --labels lesions.seg.nrrd --spacing 1 --trust-place\n"
+           "  supine-warp mycase ultrasound.nrrd --from supine --to prone --like mycase/mri.nrrd --trust-place\n"
            "  supine-warp mycase --points targets.mrk.json --points incision.fcsv\n";
   }
 
@@ -100,13 +102,18 @@ class WarpTool : public Tool {
         ->check(CLI::IsMember({"nearest", "linear", "bspline"}))
         ->capture_default_str();
     app.add_option("--blend", blend_mm_, "over how many mm what lies outside the body goes along with it")
-        ->check(not_below_zero())
+        ->check(within(0, 200))
         ->capture_default_str();
+    constexpr auto largest = static_cast<double>(std::numeric_limits<float>::max());
     app.add_option("--background", background_,
-                   "value where there is nothing to show (default: the volume's least; of labels 0)");
+                   "value where there is nothing to show (default: the volume's least; of labels 0)")
+        ->check(within(-largest, largest));
     app.add_option("--grid-mm", grid_mm_,
                    "spacing of the displacement's grid, mm (default: so that it has about 400,000 points)")
-        ->check(above_zero());
+        ->check(within(1e-3, 50));
+    app.add_flag("--trust-place", trust_place_,
+                 "carry grey volumes that hold less than half of the body or do not show its skin (an ultrasound, a "
+                 "PET): where they lie is not checked");
     app.add_flag("--no-transform", no_transform_, "write no displacement and no transform");
   }
 
@@ -174,7 +181,7 @@ class WarpTool : public Tool {
     run.stage("read " + stem_of(volume.file));
     const segmentation::ImageFile file = read_case_volume(run, measured, volume.file);
     const auto& image = file.image;
-    check_shows_body(run, poses, image.grid, volume.file.string());
+    check_holds_body(run, poses, image.grid, volume.file.string(), trust_place_);
     const Grid grid = target_grid(run, measured, image.grid, poses.target);
     warp::WarpOptions options;
     options.interpolation = volume.labels ? Interpolation::nearest : interpolations.at(interpolation_);
@@ -184,47 +191,14 @@ class WarpTool : public Tool {
     // The result, its bytes as stored, and what is kept of the source for every voxel of it.
     warp::check_memory(grid, 2.5 * sizeof(float));
     run.stage("carry " + stem_of(volume.file));
-    const double contrast = volume.labels ? 1 : doubt(run, poses, image, volume.file.string());
+    const double contrast = volume.labels ? 1 : check_shows_skin(run, poses, image, volume.file.string(), trust_place_);
     const warp::WarpedVolume carried = warp::warp_volume(poses.shapes(), image, grid, options);
+    check_body_is_there(target, carried);
     run.stage("write " + stem_of(volume.file));
     run.progress("writing");
     segmentation::write_image(carried.image, staged);
     fill(run.figures(target), poses, carried, volume, contrast);
     tell(run, target, carried);
-  }
-
-  /// Another patient's or frame's volume hardly holds this body.
-  static void check_shows_body(Run& run, const TwoPoses& poses, const Grid& grid, const std::string& name) {
-    const auto share_in = [&grid](const Points& shape, double sign) {
-      Eigen::Index inside = 0;
-      const Eigen::Vector3d last = (grid.size.array() - 1).matrix().cast<double>();
-      for (Eigen::Index p = 0; p < shape.rows(); ++p) {
-        const Eigen::Vector3d index = grid.continuous_index({sign * shape(p, 0), sign * shape(p, 1), shape(p, 2)});
-        inside += (index.array() > -0.5).all() && ((index - last).array() < 0.5).all();
-      }
-      return static_cast<double>(inside) / static_cast<double>(shape.rows());
-    };
-    constexpr double least = 0.5, whole = 0.98;
-    const double share = share_in(poses.source.positions, 1);
-    if (share >= whole) return;
-    const std::string what = fmt::format("{}: holds {:.0f} % of the body in pose {}", name, 100 * share, poses.from);
-    if (share >= least) return run.warn(what + "; the rest becomes background");
-    const double turned = share_in(poses.source.positions, -1);
-    throw InputError(fmt::format(
-        "{} (bound {:.0f} %). {}", what, 100 * least,
-        turned >= least ? "With x and y negated it would hold it: the file says LPS and is RAS, or the other way round"
-                        : "Another patient, another frame, another pose (--from) or another unit than mm?"));
-  }
-
-  static double doubt(Run& run, const TwoPoses& poses, const segmentation::GreyImage& image, const std::string& name) {
-    constexpr double usual = 0.8;
-    const double contrast = warp::skin_contrast(poses.source.mesh, poses.source.positions, image);
-    if (contrast < usual)
-      run.warn(
-          fmt::format("{} does not show the skin where the body has it in pose {}: outside it is darker than inside "
-                      "in {:.0f} % of places (usual: over {:.0f} %). Another patient, frame or pose?",
-                      name, poses.from, 100 * contrast, 100 * usual));
-    return contrast;
   }
 
   Grid target_grid(Run& run, const Case& measured, const Grid& source, const Points& shape) const {
@@ -341,7 +315,7 @@ class WarpTool : public Tool {
   double blend_mm_ = 10;
   std::optional<float> background_;
   std::optional<double> grid_mm_;
-  bool no_transform_ = false;
+  bool no_transform_ = false, trust_place_ = false;
 };
 
 }  // namespace

@@ -14,7 +14,6 @@
 #include <vtkScalarBarActor.h>
 #include <vtkSmartPointer.h>
 #include <vtkTextProperty.h>
-#include <vtkXMLPolyDataReader.h>
 
 #include <algorithm>
 #include <cmath>
@@ -23,6 +22,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "common/vtk_files.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/picture/sheet.h"
 
@@ -34,10 +34,8 @@ constexpr double panes_share = 0.86;  // of the width; the legend has the rest
 constexpr Colour grey = {0.72, 0.72, 0.72};
 
 vtkSmartPointer<vtkPolyData> read_skin(const fs::path& file) {
-  vtkNew<vtkXMLPolyDataReader> reader;
-  reader->SetFileName(file.c_str());
   vtkNew<vtkPolyDataNormals> normals;
-  normals->SetInputConnection(reader->GetOutputPort());
+  normals->SetInputData(read_vtp(file));
   normals->SplittingOff();
   normals->ConsistencyOff();
   normals->Update();

@@ -9,9 +9,10 @@
 #include <vtkRenderer.h>
 #include <vtkSmartPointer.h>
 #include <vtkThreshold.h>
-#include <vtkXMLUnstructuredGridReader.h>
+#include <vtkUnstructuredGrid.h>
 
 #include "common/error.h"
+#include "common/vtk_files.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/picture/sheet.h"
 
@@ -25,10 +26,8 @@ constexpr Colour region_colours[] = {{0.00, 0.45, 0.70}, {0.94, 0.89, 0.26}, {0.
 constexpr const char* region_names[] = {"inner (on the muscle)", "skin", "ligament ring", "cut"};
 
 vtkSmartPointer<vtkPolyData> read_boundary(const fs::path& file) {
-  vtkNew<vtkXMLUnstructuredGridReader> reader;
-  reader->SetFileName(file.c_str());
   vtkNew<vtkThreshold> boundary;
-  boundary->SetInputConnection(reader->GetOutputPort());
+  boundary->SetInputData(read_vtu(file));
   boundary->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_CELLS, "region");
   boundary->SetThresholdFunction(vtkThreshold::THRESHOLD_UPPER);
   boundary->SetUpperThreshold(1);

@@ -71,12 +71,12 @@ std::string where(const Json& diagnosis) {
   return text;
 }
 
-std::string next_measurement(const Json& diagnosis) {
+std::string next_measurement(const Json& diagnosis, const char* body) {
   const Json next = diagnosis.value("next_measurement", Json::array());
   if (next.empty()) return "measure another pose";
   const double separation = number(next[0], "separation", 0);
   const std::string pair = next[0].value("closest_pair", "");
-  return fmt::format("measure the breast {}{}", next[0].value("measurement", "in another pose"),
+  return fmt::format("measure the {} {}{}", body, next[0].value("measurement", "in another pose"),
                      separation > 0 && !pair.empty()
                          ? fmt::format(": it would separate {} by {:.0f} (9 is enough)", words(pair), separation)
                          : "");
@@ -104,7 +104,7 @@ void tell_missing(const Json& diagnosis, const Places& places, Answer& answer) {
                                places.make("calibrate"));
 }
 
-void tell_diagnosis(const Json& diagnosis, const Places& places, Answer& answer) {
+void tell_diagnosis(const Json& diagnosis, const Places& places, const char* body, Answer& answer) {
   const std::string verdict = diagnosis.value("verdict", "");
   const Json missing = diagnosis.value("missing", Json::array());
   const std::string why = diagnosis.value("why", "");
@@ -114,14 +114,18 @@ void tell_diagnosis(const Json& diagnosis, const Places& places, Answer& answer)
     answer.sentence = fmt::format("Nothing is missing: {}.", why);
     answer.next = "Use the calibrated model.";
   } else if (verdict == "ambiguous") {
-    answer.sentence = fmt::format("Something is missing, and this scan cannot tell which: {}.", listed(missing, "or"));
-    answer.next = fmt::format("To tell them apart, {}.", next_measurement(diagnosis));
+    const Json hypotheses = diagnosis.value("hypotheses", Json::array());
+    const bool may_be = !hypotheses.empty() && hypotheses[0].value("effects", Json::array()).empty();
+    answer.sentence =
+        may_be ? fmt::format("Whether {} is missing this scan cannot tell.", listed(missing, "or"))
+               : fmt::format("Something is missing, and this scan cannot tell which: {}.", listed(missing, "or"));
+    answer.next = fmt::format("To tell them apart, {}.", next_measurement(diagnosis, body));
   } else {
     answer.kind = "unexplained";
     answer.sentence = fmt::format("The model is off in a way that no effect of the catalogue explains{}.",
                                   missing.empty() ? "" : "; closest: " + listed(missing, "or"));
-    answer.next =
-        fmt::format("Look at the map below, check scan and segmentation there, and {}.", next_measurement(diagnosis));
+    answer.next = fmt::format("Look at the map below, check scan and segmentation there, and {}.",
+                              next_measurement(diagnosis, body));
   }
 }
 
@@ -136,9 +140,10 @@ std::string place_of_scan(const Json& place) {
                      length("shift_mm"), length("turn_deg"));
 }
 
-void add_facts(const Json& diagnosis, const Collected& collected, Answer& answer) {
+void add_facts(const Json& diagnosis, const Collected& collected, const char* body, Answer& answer) {
   if (const std::string spots = where(diagnosis); !spots.empty())
-    answer.facts.push_back("Where it is off: " + spots + " (plus: the breast reaches further than the model).");
+    answer.facts.push_back(
+        fmt::format("Where it is off: {} (plus: the {} reaches further than the model).", spots, body));
   if (const double left = number(diagnosis, "unexplained_mm"); std::isfinite(left))
     answer.facts.push_back(fmt::format("No effect explains {:.1f} mm of it (95 %: {:.1f} to {:.1f}).", left,
                                        diagnosis["unexplained95"][0].get<double>(),
@@ -169,8 +174,9 @@ Answer answer_of(const Case& measured, const Collected& collected, const std::ve
   answer.error = error_of(measured, collected);
   const Json& diagnosis = collected.first({"diagnosis.json", "ladder/diagnosis.json"});
   if (!diagnosis.is_null()) {
-    tell_diagnosis(diagnosis, places, answer);
-    add_facts(diagnosis, collected, answer);
+    const char* body = measured.is_object() ? "body" : "breast";
+    tell_diagnosis(diagnosis, places, body, answer);
+    add_facts(diagnosis, collected, body, answer);
     return answer;
   }
   const bool has_scan = std::any_of(measured.poses.begin(), measured.poses.end(),

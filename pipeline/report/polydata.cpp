@@ -12,13 +12,12 @@
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
 #include <vtkSmartPointer.h>
-#include <vtkXMLPolyDataReader.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "common/error.h"
-#include "common/trial_process.h"
+#include "common/vtk_files.h"
 
 namespace supine::pipeline {
 namespace {
@@ -98,16 +97,10 @@ const Eigen::VectorXd& PolyData::array(const std::string& name, const fs::path& 
 }
 
 PolyData read_polydata(const fs::path& file) {
-  if (!fs::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
-  check_survivable_by<vtkXMLPolyDataReader>(file);
-  vtkNew<vtkXMLPolyDataReader> reader;
-  if (reader->CanReadFile(file.c_str()) == 0)
-    throw InputError(fmt::format("{}: not a VTK polydata file (.vtp); write it again with its tool", file.string()));
-  reader->SetFileName(file.c_str());
-  reader->Update();
-  vtkPolyData& poly = *reader->GetOutput();
-  if (reader->GetErrorCode() != 0 || poly.GetNumberOfPoints() == 0)
-    throw InputError(fmt::format("{}: cannot be read to its end; write it again with its tool", file.string()));
+  const auto read = read_vtp(file);
+  vtkPolyData& poly = *read;
+  if (poly.GetNumberOfPoints() == 0)
+    throw InputError(fmt::format("{}: has no points; write it again with its tool", file.string()));
   PolyData data{points_of(poly), triangles_of(poly, file.string()), {}};
   for (int a = 0; a < poly.GetPointData()->GetNumberOfArrays(); ++a) {
     vtkDataArray* values = poly.GetPointData()->GetArray(a);

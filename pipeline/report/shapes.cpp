@@ -61,7 +61,8 @@ class Gatherer {
   Gatherer(Run& run, const Case& measured, const fs::path& out, const ShapeLimits& limits)
       : run_(run), case_(measured), out_(out), limits_(limits), mesh_(meshing::read_mesh(run.input(out / "mesh.vtu"))) {
     std::tie(triangles_, region_) = flat_triangles(mesh_);
-    nodes_.assign(triangles_.reshaped().begin(), triangles_.reshaped().end());
+    const auto corners = triangles_.reshaped();
+    nodes_.assign(corners.begin(), corners.end());
     std::sort(nodes_.begin(), nodes_.end());
     nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
     row_.assign(static_cast<std::size_t>(mesh_.points.rows()), -1);
@@ -135,7 +136,7 @@ class Gatherer {
 
   /// The positions of a pose file; nothing, with a warning, when it is of another mesh.
   std::optional<Points> positions(const fs::path& file) {
-    const meshing::PoseMesh pose = meshing::read_pose(run_.input(file));
+    const meshing::PoseMesh pose = meshing::read_pose(run_.input(file), file.stem().string());
     const bool same = pose.mesh.points.rows() == mesh_.points.rows() && pose.mesh.faces.rows() == mesh_.faces.rows() &&
                       (pose.mesh.points - mesh_.points).cwiseAbs().maxCoeff() < same_place_mm;
     if (same) return pose.positions;

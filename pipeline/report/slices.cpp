@@ -101,7 +101,7 @@ nlohmann::ordered_json slices_json(Run& run, const Case& measured, const fs::pat
   const fs::path calibrated = out / "calibrated" / (pose + ".vtu");
   const fs::path shape = fs::exists(calibrated) ? calibrated : out / (pose + ".vtu");
   if (file.empty() || !fs::exists(shape)) return nullptr;
-  const Points x = meshing::read_pose(run.input(shape)).positions;
+  const Points x = meshing::read_pose(run.input(shape), pose).positions;
   const GreyImage volume = segmentation::read_image(run.input(file), measured.frame).image;
   const Vector3d low = x.colwise().minCoeff().transpose().array() - margin_mm,
                  high = x.colwise().maxCoeff().transpose().array() + margin_mm;

@@ -60,7 +60,8 @@ std::string output_of(const std::string& tool, const std::string& folder) {
 }
 
 /// The command line that wrote a sidecar of @p folder, from its provenance.
-std::string command_of(const Json& figures, const Places& places, const std::string& folder) {
+/// @param surface  the image is a surface: what is read of it is the case, in place of labels
+std::string command_of(const Json& figures, const Places& places, const std::string& folder, bool surface) {
   const Json made = figures.value("provenance", Json::object());
   const std::string tool = made.value("tool", "");
   const auto row = positionals.find(tool);
@@ -72,6 +73,8 @@ std::string command_of(const Json& figures, const Places& places, const std::str
   std::string line = tool;
   for (const std::string& name : row->second)
     line += name == "case" ? " " + places.case_name : options.contains(name) ? " " + placed(plain(options[name])) : "";
+  if (surface && tool == "supine-reconstruct") line += " " + places.case_name;
+  if (surface && tool == "supine-tetrahedralise") line += " --case " + places.case_name;
   for (const auto& [name, value] : options.items()) {
     const bool positional = std::find(row->second.begin(), row->second.end(), name) != row->second.end();
     if (positional || value == false || value.empty() || value == "" || value == "[]") continue;
@@ -135,7 +138,8 @@ std::vector<Stage> stages_of(const Case& measured, const Collected& collected, c
     if (!stage.file.empty()) {
       const Json& figures = collected.find(stage.file);
       const fs::path folder = fs::path(places.out_name) / fs::path(stage.file).parent_path();
-      stage.command = command_of(figures, places, (folder / "").parent_path().generic_string());
+      stage.command =
+          command_of(figures, places, (folder / "").parent_path().generic_string(), measured.image_kind == "surface");
       stage.stale = stale(stage.file, figures, places);
     } else if (row.needs_scan && !has_scan(measured)) {
       stage.fill =

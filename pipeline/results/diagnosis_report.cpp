@@ -259,6 +259,19 @@ DiagnosisResult complete(const MeasuredCase& measured, std::unique_ptr<Findings>
   return result;
 }
 
+namespace {
+
+/// What would hide the effect at its usual size; null where straight lines say that it cannot be seen.
+Json made_up_json(const diagnosis::Candidate& candidate) {
+  if (!candidate.stand_in) return nullptr;
+  Json list = Json::array();
+  for (const diagnosis::MadeUp& number : candidate.stand_in->made_up)
+    list.push_back({{"name", number.name}, {"unit", number.unit}, {"from", number.from}, {"to", number.to}});
+  return list;
+}
+
+}  // namespace
+
 Json diagnosis_figures(const DiagnosisResult& result) {
   const Findings& found = *result.found;
   Json f;
@@ -307,7 +320,8 @@ Json diagnosis_figures(const DiagnosisResult& result) {
     if (std::find(blind.begin(), blind.end(), score.effect) != blind.end())
       f["cannot_see"].push_back({{"effect", score.effect},
                                  {"power", score.power},
-                                 {"expected_bayes_factor", std::exp(score.expected_ln_factor)}});
+                                 {"expected_bayes_factor", std::exp(score.expected_ln_factor)},
+                                 {"made_up_by", made_up_json(candidate_of(found, score.effect))}});
   for (const std::string& effect : found.unseen) f["cannot_see"].push_back({{"effect", effect}, {"power", 0.05}});
   f["next_measurement"] = Json::array();
   for (const auto& next : result.next)

@@ -96,7 +96,9 @@ void say_verdict(const Run& run, const Findings& found) {
                               : ""));
       break;
     case Verdict::ambiguous:
-      run.say(fmt::format("  missing, cannot be told apart: {}; {}", with_probabilities(found), d.why));
+      run.say(fmt::format("  {}, cannot be told{}: {}; {}",
+                          found.hypotheses.front().effects.empty() ? "may be missing" : "missing",
+                          d.missing.size() > 1 ? " apart" : "", with_probabilities(found), d.why));
       break;
     case Verdict::unexplained:
       run.say(fmt::format("  unexplained: {}{}", d.why,
@@ -129,15 +131,31 @@ void say_other_priors(const Run& run, const Findings& found) {
   }
 }
 
+/// "breast.young_modulus_kpa 130 for 112 kPa, part_stiffness.log_ratio -0.4 for 0".
+std::string made_up_in_words(const diagnosis::StandIn& stand_in) {
+  std::vector<std::string> words;
+  for (const diagnosis::MadeUp& number : stand_in.made_up)
+    words.push_back(fmt::format("{} {:.3g} for {:.3g}{}", number.name, number.to, number.from,
+                                number.unit == "1" ? "" : " " + number.unit));
+  return joined(words, ", ");
+}
+
 void say_limits(const Run& run, const DiagnosisResult& result) {
   const Findings& found = *result.found;
   std::vector<std::string> blind = diagnosis::not_seen(found);
   blind.insert(blind.end(), found.unseen.begin(), found.unseen.end());
   const auto& set = found.diagnosis.missing;
-  if (found.diagnosis.verdict == Verdict::missing && !found.diagnosis.ambiguous_rest.empty())
-    run.say("  and perhaps: " + joined(found.diagnosis.ambiguous_rest, " or "));
+  if (!found.diagnosis.ambiguous_rest.empty())
+    run.say((found.diagnosis.verdict == Verdict::missing ? "  and perhaps: "
+                                                         : "  expected, looked for, and not excluded: ") +
+            joined(found.diagnosis.ambiguous_rest, " or "));
   run.say(fmt::format("  could not be seen with this scan: {}",
                       blind.empty() ? "none" : fmt::format("{}", fmt::join(blind, ", "))));
+  for (const diagnosis::Candidate& candidate : found.candidates)
+    if (candidate.stand_in && std::find(blind.begin(), blind.end(), candidate.effect) != blind.end() &&
+        found.priors.is_expected(candidate.effect))
+      run.say(fmt::format("    {} of its usual size is made up for by {}", candidate.effect,
+                          made_up_in_words(*candidate.stand_in)));
   if (!result.next.empty()) {
     const auto& best = result.next.front();
     std::string text = "  next measurement: " + best.measurement;

@@ -2,12 +2,14 @@
 #include "pipeline/results/targets_report.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <fstream>
 #include <stdexcept>
 
 #include "common/error.h"
+#include "simulation/catalogue.h"
 
 namespace supine::pipeline {
 namespace {
@@ -16,6 +18,8 @@ using diagnosis::Depth;
 using diagnosis::TargetRegion;
 using diagnosis::TargetRegions;
 using Json = nlohmann::ordered_json;
+
+constexpr double on_skin_mm = 0.5;  // what is marked on the skin may lie as much outside the model's as inside
 
 Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -46,6 +50,10 @@ Json point_json(const TargetRegion& region) {
           {"covariance_mm2", matrix_json(region.covariance)},
           {"half_axes_mm", vector_json(region.half_axes_mm)},
           {"axes", axes},
+          {"if_nothing_missing",
+           {{"place_mm", vector_json(region.if_nothing_missing.place_mm)},
+            {"covariance_mm2", matrix_json(region.if_nothing_missing.covariance)},
+            {"half_axes_mm", vector_json(region.if_nothing_missing.half_axes_mm)}}},
           {"outside_mm", region.outside_mm},
           {"nearest_skin", depth_json(region.nearest)},
           {"vertical_skin", depth_json(region.straight)},
@@ -54,14 +62,32 @@ Json point_json(const TargetRegion& region) {
 
 Json landmarks_json(const diagnosis::ExpectedLandmarks& landmarks) {
   Json expected = Json::array();
-  for (Eigen::Index i = 0; i < landmarks.expected.rows(); ++i)
-    expected.push_back(vector_json(landmarks.expected.row(i).transpose()));
-  return {{"names", landmarks.names},
+  for (Eigen::Index i = 0; i < landmarks.expected.places.rows(); ++i)
+    expected.push_back(vector_json(landmarks.expected.places.row(i).transpose()));
+  return {{"names", landmarks.expected.names},
           {"expected_mm", expected},
-          {"covariance_mm2", matrix_json(landmarks.covariance)},
-          {"chi_squared", landmarks.square},
-          {"degrees", 3 * landmarks.names.size()},
-          {"p_value", landmarks.p_value}};
+          {"covariance_mm2", matrix_json(landmarks.expected.covariance)},
+          {"chi_squared", landmarks.agreement.chi_squared},
+          {"degrees", landmarks.agreement.degrees},
+          {"p_value", landmarks.agreement.p_value}};
+}
+
+Json sets_json(const TargetRegions& regions) {
+  if (regions.sets.empty()) return nullptr;
+  Json sets = Json::array();
+  for (const auto& set : regions.sets) sets.push_back({{"effects", set.effects}, {"probability", set.probability}});
+  return sets;
+}
+
+/// "nothing (0.82), ligament (0.05), …"
+std::string sets_in_words(const TargetRegions& regions) {
+  std::vector<std::string> words;
+  for (const auto& set : regions.sets)
+    if (words.size() < 3)
+      words.push_back(fmt::format("{} ({:.2f})",
+                                  set.effects.empty() ? "nothing" : fmt::format("{}", fmt::join(set.effects, " and ")),
+                                  set.probability));
+  return fmt::format("{}", fmt::join(words, ", "));
 }
 
 std::string cells(const std::optional<Depth>& depth, bool with_place) {
@@ -94,6 +120,7 @@ Json regions_figures(const diagnosis::TargetQuestion& question, const TargetRegi
   f["pose"] = question.pose.name;
   f["gravity"] = vector_json(question.pose.gravity);
   f["scan_counts"] = regions.measured;
+  f["may_be_missing"] = sets_json(regions);
   f["unexplained_mm"] = regions.unexplained_mm;
   f["mesh_mm"] = regions.mesh_mm;
   f["mesh_measured"] = regions.mesh_measured;
@@ -136,6 +163,32 @@ calibration::ExpectedPlaces read_expected_landmarks(const std::filesystem::path&
   }
 }
 
+std::vector<diagnosis::LikelySet> read_likely_sets(const std::filesystem::path& file) {
+  const auto refuse = [&file](const std::string& what) -> InputError {
+    return InputError(fmt::format("{}: {}; write it with supine-diagnose", file.string(), what));
+  };
+  const Json all = Json::parse(std::ifstream(file, std::ios::binary), nullptr, false);
+  if (!all.is_object() || !all.contains("hypotheses")) throw refuse("holds no hypotheses");
+  std::vector<diagnosis::LikelySet> sets;
+  double sum = 0;
+  try {
+    for (const Json& one : all["hypotheses"]) {
+      sets.push_back({one.at("effects").get<std::vector<std::string>>(), one.at("probability").get<double>()});
+      const double p = sets.back().probability;
+      if (!(p >= 0 && p <= 1)) throw refuse(fmt::format("a probability of {} (bounds 0 and 1)", p));
+      sum += p;
+      for (const std::string& name : sets.back().effects)
+        if (simulation::find_effect(name) == nullptr)
+          throw refuse(fmt::format("\"{}\" is no effect of the catalogue", name));
+    }
+  } catch (const Json::exception& why) {
+    throw refuse(why.what());
+  }
+  constexpr double rounding = 1e-6;
+  if (!(sum <= 1 + rounding)) throw refuse(fmt::format("probabilities add up to {} (bound 1)", sum));
+  return sets;
+}
+
 Json draws_figures(const diagnosis::TargetQuestion& question, const diagnosis::DrawnPlaces& drawn) {
   Json f{{"draws", drawn.draws}, {"failed", drawn.failed}, {"points", Json::array()}};
   for (std::size_t p = 0; p < question.names.size(); ++p) {
@@ -153,11 +206,15 @@ void say_regions(const Run& run, const diagnosis::TargetQuestion& question, cons
   run.say(
       fmt::format("{}: places with 95 % regions, {}", question.pose.name,
                   regions.measured ? "all that was measured taken into account" : "nothing was measured: by priors"));
+  run.say(regions.sets.empty()
+              ? std::string("  taken that the model lacks nothing")
+              : "  over what the model may lack, likeliest first: " + sets_in_words(regions) + ", ...");
   run.say(fmt::format("  {:<18}{:>9}{:>9}{:>9}{:>22}{:>16}{:>16}", "point", "x", "y", "z", "half axes, mm",
                       "to skin, mm", "straight up, mm"));
   for (const TargetRegion& r : regions.points) {
-    const auto depth = [](const std::optional<Depth>& d) {
-      return d ? fmt::format("{:.1f} +- {:.1f}", d->mm, d->sd_mm) : std::string("-");
+    const auto depth = [](const std::optional<Depth>& d) -> std::string {
+      if (!d) return std::string("-");
+      return d->mm < on_skin_mm ? "on the skin" : fmt::format("{:.1f} +- {:.1f}", d->mm, d->sd_mm);
     };
     run.say(fmt::format("  {:<18}{:>9.1f}{:>9.1f}{:>9.1f}{:>22}{:>16}{:>16}", r.name, r.place_mm.x(), r.place_mm.y(),
                         r.place_mm.z(),
@@ -172,7 +229,8 @@ void say_regions(const Run& run, const diagnosis::TargetQuestion& question, cons
     run.say(
         fmt::format("  landmarks against where all else expects them: p = {:.3g} (chi squared {:.1f} with {} "
                     "degrees)",
-                    regions.landmarks->p_value, regions.landmarks->square, 3 * regions.landmarks->names.size()));
+                    regions.landmarks->agreement.p_value, regions.landmarks->agreement.chi_squared,
+                    regions.landmarks->agreement.degrees));
 }
 
 void say_draws(const Run& run, const diagnosis::TargetQuestion& question, const diagnosis::DrawnPlaces& drawn) {

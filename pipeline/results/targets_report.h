@@ -24,6 +24,10 @@ nlohmann::ordered_json regions_figures(const diagnosis::TargetQuestion& question
 /// @throws InputError  not such a file, of another pose, or of a pose without measured landmarks
 calibration::ExpectedPlaces read_expected_landmarks(const std::filesystem::path& file, const std::string& pose);
 
+/// The `hypotheses` of a diagnosis.json.
+/// @throws InputError  not such a file, or one whose probabilities are none
+std::vector<diagnosis::LikelySet> read_likely_sets(const std::filesystem::path& file);
+
 nlohmann::ordered_json draws_figures(const diagnosis::TargetQuestion& question, const diagnosis::DrawnPlaces& drawn);
 
 void say_regions(const Run& run, const diagnosis::TargetQuestion& question, const diagnosis::TargetRegions& regions);

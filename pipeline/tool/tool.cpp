@@ -83,6 +83,15 @@ CLI::Validator not_below_zero() {
   return {[](const std::string& text) { return number_of(text) >= 0 ? "" : text + " is no number from 0 up"; }, ">= 0"};
 }
 
+CLI::Validator within(double lower, double upper) {
+  const std::string range = fmt::format("{:g} to {:g}", lower, upper);
+  return {[=](const std::string& text) {
+            const double number = number_of(text);
+            return number >= lower && number <= upper ? "" : text + " is no number in " + range;
+          },
+          range};
+}
+
 int tool_main(Tool& tool, int argc, char** argv) {
   use_fitting_settings(argv);
   install_interrupt_handler();

@@ -71,9 +71,10 @@ class Run {
   int threads_;
 };
 
-/// Checks of an option that is one finite number: above zero; zero or more.
+/// Checks of an option that is one finite number: above zero; zero or more; in a range, which CLI::Range lets NaN into.
 CLI::Validator above_zero();
 CLI::Validator not_below_zero();
+CLI::Validator within(double lower, double upper);
 
 /// A command-line tool. Declares its options, then runs once.
 class Tool {

@@ -179,12 +179,17 @@ Json shape_figures(const CaseInputs& in, const Simulated& simulated, const std::
   const simulation::ChainSolution& solution = simulated.solution;
   const Points& x = shape_of(simulated, name);
   if (name == simulation::free_of_load) return figures_of(in, simulated, solution.inverse, x);
-  if (name == simulated.loads.front().name)
-    return figures_of(in, simulated, solution.round_trip.report, in.mesh.points);
-  const PoseSolution* pose = pose_named(solution, name);
-  Json f = figures_of(in, simulated, pose->report, x);
+  const bool imaged = name == simulated.loads.front().name;
+  const PoseSolution* pose = imaged ? nullptr : pose_named(solution, name);
+  Json f = imaged ? figures_of(in, simulated, solution.round_trip.report, in.mesh.points)
+                  : figures_of(in, simulated, pose->report, x);
+  const Eigen::Vector3d& gravity = in.description.pose(name).gravity;
+  f["gravity"] = {gravity.x(), gravity.y(), gravity.z()};
+  if (imaged) return f;
   f["second_shape_mm"] = pose->second_shape_mm;
+  if (pose->report.turned) f["turned"] = true;
   if (pose->contact) f["contact"] = contact_figures(*pose->contact);
+  if (pose->chest_contact) f["chest_contact"] = contact_figures(*pose->chest_contact);
   return f;
 }
 
@@ -198,7 +203,9 @@ void write_shape(const CaseInputs& in, const Simulated& simulated, const std::st
   meshing::NamedTables at_cells = {{"det_f", simulation::cell_det_f(in.mesh.cells, x, solution.X)}};
   const PoseSolution* pose = pose_named(solution, name);
   if (pose != nullptr && pose->contact) at_cells.emplace_back("contact_kpa", contact_pressure(in, *pose->contact));
-  meshing::write_pose(in.mesh, x, at_points, at_cells, file, in.description.side);
+  if (pose != nullptr && pose->chest_contact)
+    at_cells.emplace_back("chest_contact_kpa", contact_pressure(in, *pose->chest_contact));
+  meshing::write_pose(in.mesh, x, at_points, at_cells, file, in.description.side, name);
 }
 
 void say_simulated(const Run& run, const CaseInputs& in, const Simulated& simulated) {
@@ -216,9 +223,18 @@ void say_simulated(const Run& run, const CaseInputs& in, const Simulated& simula
   row("undeformed", solution.inverse, solution.X);
   for (const PoseSolution& pose : solution.poses) row(pose.name, pose.report, pose.x);
   for (const PoseSolution& pose : solution.poses)
-    if (pose.contact)
-      run.say(fmt::format("  {}: skin presses on skin over {:.1f} cm2, {:.2f} kPa at most, {:.2f} mm deep at most",
-                          pose.name, pose.contact->area_cm2, pose.contact->pressure_kpa, pose.contact->overlap_mm));
+    if (pose.report.turned)
+      run.say(
+          fmt::format("  {}: reached by turning the body there from {}; growing gravity alone leads to no equilibrium",
+                      pose.name, imaged));
+  const auto touches = [&run](const std::string& pose, const char* what, const simulation::ContactFigures& contact) {
+    run.say(fmt::format("  {}: skin presses on {} over {:.1f} cm2, {:.2f} kPa at most, {:.2f} mm deep at most", pose,
+                        what, contact.area_cm2, contact.pressure_kpa, contact.overlap_mm));
+  };
+  for (const PoseSolution& pose : solution.poses) {
+    if (pose.contact) touches(pose.name, "skin", *pose.contact);
+    if (pose.chest_contact) touches(pose.name, "the chest beside the breast", *pose.chest_contact);
+  }
   if (imaged == simulation::free_of_load)
     return run.say("  imaged free of load: its shape is the undeformed one, there is no inverse and no round trip");
   run.say(fmt::format("  round trip undeformed → {}: {:.2e} mm at most (bound {:.0e}), {} Newton steps", imaged,

@@ -51,6 +51,12 @@ void set_axes(const std::filesystem::path& file, const Eigen::Matrix3d& axes, Gr
           fmt::format("{}: spacing of axis {} is {} mm; it must be > 0", file.string(), a, grid.spacing_mm[a]));
     grid.direction.col(a) = axes.col(a) / grid.spacing_mm[a];
   }
+  constexpr double most_unequal = 25;
+  if (const double least = grid.spacing_mm.minCoeff(), most = grid.spacing_mm.maxCoeff(); most > most_unequal * least)
+    throw InputError(
+        fmt::format("{}: spacings of {:g} and {:g} mm in one volume (bound: a factor of {}): is one of them "
+                    "in another unit, or not that axis's?",
+                    file.string(), least, most, most_unequal));
   const double deviation =
       (grid.direction.transpose() * grid.direction - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(deviation <= orthonormal_tolerance))

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <fmt/format.h>
-#include <vtkCallbackCommand.h>
 #include <vtkCellData.h>
-#include <vtkExecutive.h>
 #include <vtkFieldData.h>
 #include <vtkFloatArray.h>
 #include <vtkImageData.h>
@@ -11,13 +9,13 @@
 #include <vtkPointData.h>
 #include <vtkStringArray.h>
 #include <vtkUnsignedCharArray.h>
-#include <vtkXMLImageDataReader.h>
 #include <vtkXMLImageDataWriter.h>
 
 #include <algorithm>
 
 #include "common/error.h"
-#include "common/trial_process.h"
+#include "common/vtk_errors.h"
+#include "common/vtk_files.h"
 #include "segmentation/formats/image_formats.h"
 #include "segmentation/formats/image_io.h"
 #include "segmentation/formats/labels_io.h"
@@ -31,57 +29,11 @@ constexpr const char* share_array = "fraction_gland";
 constexpr const char* support_array = "support";
 constexpr const char* support_names = "support_names";
 
-std::optional<std::string> field_string(vtkImageData& image, const char* name) {
-  auto* array = vtkStringArray::SafeDownCast(image.GetFieldData()->GetAbstractArray(name));
-  if (!array || array->GetNumberOfValues() < 1) return std::nullopt;
-  return array->GetValue(0);
-}
-
 void add_strings(vtkImageData& image, const char* name, const std::vector<std::string>& values) {
   vtkNew<vtkStringArray> array;
   array->SetName(name);
   for (const std::string& value : values) array->InsertNextValue(value);
   image.GetFieldData()->AddArray(array);
-}
-
-/// Collects the text of VTK's errors instead of letting it reach the terminal.
-class ErrorCollector {
- public:
-  explicit ErrorCollector(vtkAlgorithm& algorithm) {
-    command_->SetCallback([](vtkObject*, unsigned long, void* client, void* text) {
-      auto& message = *static_cast<std::string*>(client);
-      if (message.empty() && text) message = static_cast<const char*>(text);
-    });
-    command_->SetClientData(&message_);
-    algorithm.AddObserver(vtkCommand::ErrorEvent, command_);
-    algorithm.GetExecutive()->AddObserver(vtkCommand::ErrorEvent, command_);
-  }
-  vtkCommand* command() { return command_; }
-  std::string message() const {
-    std::string line = message_;
-    std::replace(line.begin(), line.end(), '\n', ' ');
-    return line;
-  }
-
- private:
-  std::string message_;
-  vtkNew<vtkCallbackCommand> command_;
-};
-
-void update(vtkXMLImageDataReader& reader, const std::filesystem::path& file) {
-  check_survivable_by<vtkXMLImageDataReader>(file);
-  ErrorCollector errors(reader);
-  reader.SetReaderErrorObserver(errors.command());
-  reader.SetParserErrorObserver(errors.command());
-  reader.SetFileName(file.c_str());
-  reader.Update();
-  reader.SetReaderErrorObserver(nullptr);
-  reader.SetParserErrorObserver(nullptr);
-  reader.RemoveAllObservers();
-  reader.GetExecutive()->RemoveAllObservers();
-  if (!errors.message().empty() || reader.GetErrorCode() != 0)
-    throw InputError(
-        fmt::format("{}: cannot be read as VTI (damaged or truncated?): {}", file.string(), errors.message()));
 }
 
 /// The scalar array: `tissue`, else the active scalars, else the only array; of points, else of cells.
@@ -102,9 +54,8 @@ vtkDataArray* find_scalars(vtkImageData& image, bool& on_cells) {
 namespace formats {
 
 RawImage read_vti(const std::filesystem::path& file) {
-  vtkNew<vtkXMLImageDataReader> reader;
-  update(*reader, file);
-  vtkImageData& data = *reader->GetOutput();
+  const auto read = supine::read_vti(file);
+  vtkImageData& data = *read;
   bool on_cells = false;
   vtkDataArray* scalars = find_scalars(data, on_cells);
   if (!scalars)
@@ -113,10 +64,10 @@ RawImage read_vti(const std::filesystem::path& file) {
     throw InputError(fmt::format("{}: array \"{}\" has {} components; a scalar volume is needed, not colour",
                                  file.string(), scalars->GetName() ? scalars->GetName() : "",
                                  scalars->GetNumberOfComponents()));
-  if (const auto unit = field_string(data, "unit"); unit && *unit != "mm")
+  if (const auto unit = field_text(data, "unit"); unit && *unit != "mm")
     throw InputError(fmt::format("{}: field data unit is \"{}\"; mm expected", file.string(), *unit));
   RawImage image;
-  image.frame = field_string(data, "frame");
+  image.frame = field_text(data, "frame");
   Eigen::Vector3d first;  // continuous index of the first voxel's centre
   for (int a = 0; a < 3; ++a) {
     const int *extent = data.GetExtent(), points = extent[2 * a + 1] - extent[2 * a] + 1;
@@ -180,15 +131,12 @@ void write_labels(const LabelImage& labels, const std::filesystem::path& file, c
   add_strings(*data, "tissue_names", {tissue_names.begin(), tissue_names.end()});
   for (const auto& [key, value] : notes) add_strings(*data, key.c_str(), {value});
   vtkNew<vtkXMLImageDataWriter> writer;
-  ErrorCollector errors(*writer);
+  const VtkErrors errors(*writer);
   writer->SetFileName(file.c_str());
   writer->SetInputData(data);
   writer->SetCompressionLevel(1);
   writer->EncodeAppendedDataOff();
-  const bool written = writer->Write() == 1;
-  writer->RemoveAllObservers();
-  writer->GetExecutive()->RemoveAllObservers();
-  if (!written || !errors.message().empty())
+  if (writer->Write() != 1 || errors.any())
     throw InputError(fmt::format("{}: cannot be written (disk full, or no permission?)", file.string()));
 }
 
@@ -207,9 +155,8 @@ LabelImage read_labels(const std::filesystem::path& file) {
 }
 
 std::vector<float> read_gland_share(const std::filesystem::path& file) {
-  vtkNew<vtkXMLImageDataReader> reader;
-  update(*reader, file);
-  auto* array = vtkFloatArray::SafeDownCast(reader->GetOutput()->GetPointData()->GetArray(share_array));
+  const auto read = supine::read_vti(file);
+  auto* array = vtkFloatArray::SafeDownCast(read->GetPointData()->GetArray(share_array));
   if (!array) return {};
   if (array->GetNumberOfComponents() != 1)
     throw InputError(fmt::format("{}: array `{}` has {} components; one number a voxel is expected", file.string(),
@@ -223,13 +170,11 @@ std::vector<float> read_gland_share(const std::filesystem::path& file) {
 }
 
 SupportVoxels read_label_supports(const std::filesystem::path& file) {
-  vtkNew<vtkXMLImageDataReader> reader;
-  update(*reader, file);
-  vtkImageData& data = *reader->GetOutput();
+  const auto read = supine::read_vti(file);
+  vtkImageData& data = *read;
   SupportVoxels supports;
-  auto* names = vtkStringArray::SafeDownCast(data.GetFieldData()->GetAbstractArray(support_names));
-  if (!names || names->GetNumberOfValues() == 0) return supports;
-  for (vtkIdType n = 0; n < names->GetNumberOfValues(); ++n) supports.names.push_back(names->GetValue(n));
+  supports.names = field_texts(data, support_names);
+  if (supports.names.empty()) return supports;
   auto* array = vtkUnsignedCharArray::SafeDownCast(data.GetPointData()->GetArray(support_array));
   if (!array || array->GetNumberOfComponents() != 1 || !data.GetPointData()->GetArray(label_array))
     throw InputError(
@@ -252,11 +197,10 @@ SupportVoxels read_label_supports(const std::filesystem::path& file) {
 }
 
 LabelNotes read_label_notes(const std::filesystem::path& file) {
-  vtkNew<vtkXMLImageDataReader> reader;
-  update(*reader, file);
+  const auto read = supine::read_vti(file);
   LabelNotes notes;
   for (const char* key : {"cut", "rim_mm", "side"})
-    if (const auto value = field_string(*reader->GetOutput(), key)) notes[key] = *value;
+    if (const auto value = field_text(*read, key)) notes[key] = *value;
   return notes;
 }
 

@@ -23,7 +23,7 @@ const std::vector<OptionRow>& PartStiffness::options() const {
   return rows;
 }
 
-bool PartStiffness::belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy&) const {
+bool PartStiffness::belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy&, const Model&) const {
   return !mesh.part_names.empty();
 }
 

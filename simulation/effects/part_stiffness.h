@@ -13,7 +13,7 @@ class PartStiffness : public Effect {
   std::string meaning() const override { return "a named part of the body stiffer or softer than the rest"; }
   const std::vector<Parameter>& parameters() const override;
   const std::vector<OptionRow>& options() const override;
-  bool belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy) const override;
+  bool belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model) const override;
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/effects/tissue_stiffness.h"
 
+#include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
 #include "simulation/fields.h"
 
@@ -8,6 +9,10 @@ namespace supine::simulation {
 
 std::string TissueStiffness::meaning() const {
   return std::string(segmentation::tissue_names[static_cast<int>(tissue_)]) + " stiffer than the rest of the breast";
+}
+
+bool TissueStiffness::belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model&) const {
+  return !anatomy.is_object() || (mesh.fraction.col(static_cast<int>(tissue_)).array() > 0).any();
 }
 
 void TissueStiffness::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,

@@ -18,6 +18,8 @@ class TissueStiffness : public Effect {
   double tolerance(const std::string&, const MeasurementTolerances& known) const override {
     return is_gland() ? known.gland_log : 0;
   }
+  /// An object whose labels know no such tissue has none.
+  bool belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model) const override;
   const std::vector<Parameter>& parameters() const override { return rows_; }
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;

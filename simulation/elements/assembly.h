@@ -74,7 +74,7 @@ struct Demand {
   bool residual = false;
   bool tangent = false;            ///< ∂r/∂x
   bool reference_tangent = false;  ///< ∂r/∂X
-  bool convex = false;  ///< tangent without the skin's negative curvature: a descent direction far from the answer
+  bool convex = false;  ///< tangent without the negative curvature of tissue and skin: of descent far from the answer
 };
 
 /// The sums over all terms. Matrices must have the pattern; sizes are set once and reused.

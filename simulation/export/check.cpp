@@ -106,7 +106,7 @@ void check_exportable(Solver solver, const meshing::TetMesh& mesh, const meshing
     refuse(words, "supports with names (springs along and across the normal)",
            "only a breast on its muscle is written");
   if (model.contact.kind != ContactKind::off)
-    refuse(words, "[contact] (skin on skin by smooth surfaces)", "leave the table out of the model");
+    refuse(words, "[contact] (skin on smooth surfaces: skin or chest)", "leave the table out of the model");
   check_model(words, model);
   const Layout layout = make_layout(mesh, anatomy);
   for (const PoseLoad& pose : poses) check_fields(words, model, {mesh, anatomy, layout, pose.name}, pose.gravity);

@@ -6,12 +6,10 @@
 #include <vector>
 
 #include "simulation/laws/invariant_laws.h"
+#include "simulation/laws/point_tangent.h"
 #include "simulation/laws/rotation_laws.h"
 
 namespace supine::simulation {
-
-/// ∂P_iJ/∂F_kL at row 3i+J, column 3k+L, kPa.
-using Tangent9 = Eigen::Matrix<double, 9, 9>;
 
 /// Names of breast.law in model.toml.
 const std::vector<std::pair<std::string, BulkLaw>>& bulk_law_names();

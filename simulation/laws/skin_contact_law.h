@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-namespace supine::simulation {
+#include "common/curve.h"
 
-/// A function of one number with two derivatives.
-struct Curve {
-  double value = 0, slope = 0, curvature = 0;
-};
+namespace supine::simulation {
 
 /// Energy per area of two skins a gap apart (negative: overlap), in kPa mm; its slope is minus the pressure between
 /// them. None beyond the band; within it the pressure grows as a parabola up to stiffness × band / 2 where they touch,
@@ -17,13 +14,6 @@ inline Curve contact_energy(double gap_mm, double stiffness_kpa_per_mm, double b
   if (!(z > 0)) return {};
   if (z < b) return {k * z * z * z / (6 * b), -k * z * z / (2 * b), k * z / b};
   return {k * (b * b / 6 + 0.5 * z * (z - b)), -k * (z - 0.5 * b), k};
-}
-
-/// From 0 at t <= 0 to 1 at t >= 1, twice continuously differentiable.
-inline Curve smooth_step(double t) {
-  if (!(t > 0)) return {};
-  if (t >= 1) return {1, 0, 0};
-  return {t * t * t * (10 + t * (6 * t - 15)), 30 * t * t * (1 - t) * (1 - t), 60 * t * (1 - t) * (1 - 2 * t)};
 }
 
 /// Weight of a place by its squared distance over that of the edge of its reach: (1 - t)³, 0 beyond.

@@ -8,6 +8,7 @@
 #include "simulation/solve/folds.h"
 #include "simulation/solve/overlap.h"
 #include "simulation/solve/pushed_forward.h"
+#include "simulation/solve/turning.h"
 
 namespace supine::simulation {
 namespace {
@@ -66,6 +67,16 @@ void note_folds(const meshing::TetMesh& mesh, const Points& shape, const std::st
   if (folds.cells > 0) warnings.push_back(folds_warning(name, folds));
 }
 
+/// Names the faces that contact with the chest leaves alone.
+void note_left_on_chest(const LeftOut& left, const std::string& name, std::vector<std::string>& warnings) {
+  if (left.pairs == 0) return;
+  const Eigen::Vector3d& at = left.place_mm;
+  warnings.push_back(fmt::format(
+      "{}: {} faces of the skin lie {} the chest beside the breast already, {:.1f} mm at ({:.1f}, {:.1f}, {:.1f}) mm; "
+      "contact leaves them out",
+      name, left.pairs, left.deepest_mm < 0 ? "inside" : "on", std::abs(left.deepest_mm), at.x(), at.y(), at.z()));
+}
+
 /// Names the pairs of faces that contact leaves alone.
 void note_left_out(const LeftOut& left, const std::string& name, std::vector<std::string>& warnings) {
   if (left.pairs == 0) return;
@@ -94,9 +105,23 @@ Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
 
 }  // namespace
 
+namespace {
+
+/// A body that cannot be turned over has the one way, and all the work for it.
+SolveOptions work_of(SolveOptions options, const PoseLoad& imaged) {
+  constexpr double both_ways = 1.8;
+  if (imaged.name == free_of_load || !(imaged.gravity.norm() > 0))
+    options.most_work = static_cast<int>(both_ways * options.most_work);
+  return options;
+}
+
+}  // namespace
+
 Chain::Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
              std::vector<PoseLoad> poses, SolveOptions options)
-    : poses_(std::move(poses)), mechanics_(mesh, anatomy, model), solver_(mechanics_, std::move(options)) {
+    : poses_(std::move(poses)),
+      mechanics_(mesh, anatomy, model),
+      solver_(mechanics_, work_of(std::move(options), poses_.at(0))) {
   check_imaged_pose(poses_.at(0), anatomy);
   for (const PoseLoad& pose : poses_) check_supine_gravity(pose, anatomy);
 }
@@ -130,13 +155,30 @@ ChainSolution Chain::solve_all(const Model& model, const ChainSolution* near, In
     Points start;
     if (near != nullptr) start = pushed_forward(mesh.cells, near->poses[p - 1].x, near->X, solution.X);
     PoseSolution pose{.name = poses_[p].name, .x = {}, .report = {}};
-    pose.report = solver_.forward(solution.X, pose.x, "undeformed → " + pose.name, near != nullptr ? &start : nullptr);
+    pose.report = solve_pose(model, poses_[p], near != nullptr ? &start : nullptr, solution, pose.x);
     check_cells(mesh, pose.x, solution.X, pose.name, pose.report);
     note_folds(mesh, pose.x, pose.name, pose.report, solution.warnings);
     solution.poses.push_back(std::move(pose));
   }
   solution.work = solver_.work() - work_before;
   return solution;
+}
+
+/// By growing load; where that leads nowhere, as the patient turns.
+SolveReport Chain::solve_pose(const Model& model, const PoseLoad& pose, const Points* start,
+                              const ChainSolution& solution, Points& x) {
+  try {
+    return solver_.forward(solution.X, x, "undeformed → " + pose.name, start);
+  } catch (const NoEquilibrium&) {
+    if (imaged_free_of_load() || !(poses_[0].gravity.norm() > 0) || !(pose.gravity.norm() > 0)) throw;
+    const auto turned_load = [&](const Eigen::Vector3d& gravity) { load(model, {pose.name, gravity}); };
+    x = solution.prone;
+    const Turn turn = turn_of(mechanics_.anatomy(), poses_[0].gravity, pose.gravity);
+    const std::optional<SolveReport> report =
+        turn_over(solver_, turn, turned_load, solution.X, x, poses_[0].name + ", turning, → " + pose.name);
+    if (!report) throw;
+    return *report;
+  }
 }
 
 void Chain::certify(const Model& model, ChainSolution& solution) {
@@ -163,10 +205,28 @@ void Chain::look_for_contact(const Model& model, ChainSolution& solution) {
     if (!imaged_free_of_load()) note_left_out(contact->left_out_imaged(), poses_[0].name, solution.warnings);
     note_left_out(contact->left_out(solution.X), free_of_load, solution.warnings);
   }
+  const ChestContact* on_chest = mechanics_.chest_contact();
+  if (on_chest != nullptr) {
+    if (!imaged_free_of_load()) note_left_on_chest(on_chest->left_out_imaged(), poses_[0].name, solution.warnings);
+    note_left_on_chest(on_chest->left_out(solution.X), free_of_load, solution.warnings);
+  }
   const Indices skin = mesh.faces(mechanics_.layout().skin.faces, Eigen::all);
   for (PoseSolution& pose : solution.poses) {
     if (contact != nullptr) pose.contact = contact->figures({.x = pose.x, .X = solution.X});
-    const std::string warning = overlap_warning(pose.name, find_overlap(mesh, skin, pose.x), model.contact);
+    if (on_chest != nullptr) pose.chest_contact = on_chest->figures({.x = pose.x, .X = solution.X});
+    const std::string warning =
+        overlap_warning(pose.name, find_overlap(mesh, skin, pose.x), model.contact, pose.report.folded_cells);
+    if (!warning.empty()) solution.warnings.push_back(warning);
+  }
+  look_into_chest(model, skin, solution);
+}
+
+/// Warns of skin that lies in the chest beside the breast.
+void Chain::look_into_chest(const Model& model, const Indices& skin, ChainSolution& solution) const {
+  const std::optional<meshing::ChestBeside> chest = meshing::chest_beside(mechanics_.mesh(), mechanics_.anatomy());
+  if (!chest) return;
+  for (const PoseSolution& pose : solution.poses) {
+    const std::string warning = in_chest_warning(pose.name, find_in_chest(*chest, skin, pose.x), model.contact);
     if (!warning.empty()) solution.warnings.push_back(warning);
   }
 }

@@ -30,7 +30,8 @@ struct PoseSolution {
   /// Looked for by Chain::certify() and only where forces have no energy (corotational_qr, friction): with one, the
   /// solver goes downhill.
   double second_shape_mm = 0;
-  std::optional<ContactFigures> contact{};  ///< what touches, where the model has [contact]; by Chain::certify()
+  std::optional<ContactFigures> contact{};        ///< what touches, where the model has [contact]; by Chain::certify()
+  std::optional<ContactFigures> chest_contact{};  ///< the same of the chest beside the breast
 };
 
 struct ChainSolution {
@@ -95,9 +96,12 @@ class Chain {
   friend class Sensitivities;
   ChainSolution solve_all(const Model& model, const ChainSolution* near, InverseMethod method);
   void load(const Model& model, const PoseLoad& pose);
+  SolveReport solve_pose(const Model& model, const PoseLoad& pose, const Points* start, const ChainSolution& solution,
+                         Points& x);
   void solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
   void correct_by_fixed_point(const Model& model, ChainSolution& solution);
   void look_for_contact(const Model& model, ChainSolution& solution);
+  void look_into_chest(const Model& model, const Indices& skin, ChainSolution& solution) const;
   void look_for_second_shapes(const Model& model, ChainSolution& solution);
 
   std::vector<PoseLoad> poses_;

@@ -92,25 +92,41 @@ SolveReport EquilibriumSolver::inverse(const Points& x, Points& X, const std::st
 
 int EquilibriumSolver::work() const { return steps_ + work_of_factor * direction_->factorisations(); }
 
-SolveReport EquilibriumSolver::solve(Unknown unknown, const Points& known, Points& sought, const std::string& what,
-                                     const Points* start) {
+/// What a solve is measured by.
+void EquilibriumSolver::begin(const Points& known, const std::string& what) {
   mechanics_.evaluate(State{.x = known, .X = known, .load = 1.0}, Demand{.residual = true}, sums_);
   weight_norm_ = sums_.residual.norm();
   // A body that floats has no weight to compare with: it is balanced where only rounding is left.
   if (weight_norm_ < rounding_mn) weight_norm_ = rounding_mn / std::max(options_.residual_tolerance, 1e-16);
-  const int factorised_before = direction_->factorisations(), work_before = work();
-  solve_end_ = std::min(work_end_, work_before + options_.most_work);
+  solve_end_ = std::min(work_end_, work() + options_.most_work);
   what_ = what;
+}
+
+SolveReport EquilibriumSolver::from_start(const Attempt& attempt, int factorised_before) const {
+  return {.newton_iterations = attempt.iterations,
+          .factorisations = direction_->factorisations() - factorised_before,
+          .load_steps = 1,
+          .min_det_f = attempt.min_det_f,
+          .residual_share = attempt.residual_share,
+          .termination = attempt.end};
+}
+
+std::optional<SolveReport> EquilibriumSolver::forward_from(const Points& X, Points& x, const std::string& what) {
+  begin(X, what);
+  const int factorised_before = direction_->factorisations();
+  const Attempt attempt = newton({.unknown = Unknown::deformed, .known = X, .load = 1.0}, x);
+  if (!converged(attempt.end)) return std::nullopt;
+  return from_start(attempt, factorised_before);
+}
+
+SolveReport EquilibriumSolver::solve(Unknown unknown, const Points& known, Points& sought, const std::string& what,
+                                     const Points* start) {
+  begin(known, what);
+  const int factorised_before = direction_->factorisations();
   if (start != nullptr) {
     sought = *start;
     const Attempt attempt = newton({.unknown = unknown, .known = known, .load = 1.0}, sought);
-    if (converged(attempt.end))
-      return {.newton_iterations = attempt.iterations,
-              .factorisations = direction_->factorisations() - factorised_before,
-              .load_steps = 1,
-              .min_det_f = attempt.min_det_f,
-              .residual_share = attempt.residual_share,
-              .termination = attempt.end};
+    if (converged(attempt.end)) return from_start(attempt, factorised_before);
   }
   sought = known;
   SolveReport report = step_load(unknown, known, sought);

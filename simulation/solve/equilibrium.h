@@ -15,8 +15,8 @@ namespace supine::simulation {
 class NewtonDirection;
 
 struct SolveOptions {
-  int max_iterations = 80;                ///< Newton steps per load step, >= 0
-  int most_work = 1500;                   ///< of one solve (EquilibriumSolver::work()), >= 0
+  int max_iterations = 50;                ///< Newton steps per load step, >= 0
+  int most_work = 500;                    ///< of one solve (EquilibriumSolver::work()), >= 0
   double step_tolerance_mm = 1e-8;        ///< of Termination::step_small, >= 0
   double residual_tolerance = 1e-11;      ///< of Termination::residual_small, share of the weight, >= 0
   double smallest_load_step = 1.0 / 128;  ///< share of the load, in (0, 1]
@@ -67,6 +67,7 @@ struct SolveReport {
   double min_det_f = 1;       ///< smallest det F (F = ∂x/∂X) over the quadrature points
   double residual_share = 0;  ///< |r| / |w| at the end, as in Termination; 0 without weight
   Termination termination = Termination::residual_small;  ///< of the last load step: one of the converged
+  bool turned = false;   ///< reached by gravity that turned from another pose (turning.h), in load_steps steps
   int folded_cells = 0;  ///< filled by Chain: quadratic cells inside out between their quadrature points (folds.h)
 };
 
@@ -97,6 +98,11 @@ class EquilibriumSolver {
   /// @param start  a shape close to the answer, tried first at full load; or nullptr
   /// @throws NumericalFailure  load fraction reached, worst element and place, what to change; x is then undefined
   SolveReport forward(const Points& X, Points& x, const std::string& what, const Points* start = nullptr);
+
+  /// The same from a shape close to the answer alone, at full load.
+  /// @param x  in: that shape; out: the answer
+  /// @return nothing, and x undefined, where Newton's method does not come to an equilibrium from there
+  std::optional<SolveReport> forward_from(const Points& X, Points& x, const std::string& what);
 
   /// Undeformed shape whose equilibrium under the load is the known deformed one (Govindjee and Mihalic 1996;
   /// Mazier et al. 2022). Unknown X, matrix ∂r/∂X. A step is good when it lowers |r| or the way in mm that the kept
@@ -152,6 +158,8 @@ class EquilibriumSolver {
     double least_det_f;                ///< that a shape on the line must keep
   };
 
+  void begin(const Points& known, const std::string& what);
+  SolveReport from_start(const Attempt& attempt, int factorised_before) const;
   SolveReport solve(Unknown unknown, const Points& known, Points& sought, const std::string& what, const Points* start);
   SolveReport step_load(Unknown unknown, const Points& known, Points& sought);
   Attempt attempt_step(const Problem& problem, const Points& from, const Points& ahead, Points& trial);

@@ -14,7 +14,8 @@ constexpr int gram_schmidt_passes = 2;  // one loses orthogonality when the resi
 }  // namespace
 
 KrylovReport Krylov::conjugate_gradients(const LinearMap& matrix, const LinearMap& preconditioner,
-                                         const Eigen::VectorXd& b, const KrylovOptions& options, Eigen::VectorXd& x) {
+                                         const Eigen::VectorXd& b, const KrylovOptions& options, Eigen::VectorXd& x,
+                                         Eigen::VectorXd* way) {
   for (Eigen::VectorXd* work : {&r_, &z_, &p_, &q_}) work->resize(size_);
   KrylovReport report;
   x.setZero(size_);
@@ -34,6 +35,7 @@ KrylovReport Krylov::conjugate_gradients(const LinearMap& matrix, const LinearMa
     matrix(p_, q_);
     const double curvature = p_.dot(q_);
     report.negative_curvature = !(curvature > 0);
+    if (report.negative_curvature && way != nullptr) *way = p_;
     if (report.negative_curvature) return report;
     ++report.iterations;
     const double alpha = rho / curvature;

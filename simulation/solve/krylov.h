@@ -38,8 +38,9 @@ class Krylov {
   /// ½ xᵀ A x - bᵀ x (Steihaug 1983).
   /// @param preconditioner  approximate A⁻¹
   /// @param x  out: what was reached, whether converged or not; zero for b = 0
+  /// @param way  out: where negative curvature was met, the direction that shows it, one of descent too; else as it was
   KrylovReport conjugate_gradients(const LinearMap& matrix, const LinearMap& preconditioner, const Eigen::VectorXd& b,
-                                   const KrylovOptions& options, Eigen::VectorXd& x);
+                                   const KrylovOptions& options, Eigen::VectorXd& x, Eigen::VectorXd* way = nullptr);
 
   /// Flexible GMRES without restart (Saad 1993), preconditioned from the right so that its residual is the true one, in
   /// single precision too; from x = 0; any regular A. Parameters as of conjugate_gradients(); the bases take

@@ -24,6 +24,7 @@ constexpr double shift_growth = 6;    // from one try to the next
 constexpr double close_mm = 1;            // a kept factor is worth trying after steps shorter than this
 constexpr double many_solves = 40;        // or where a new one costs as much as so many solves
 constexpr double usable_reduction = 0.5;  // a linear solve that got this far is still a direction
+constexpr double longest_bend_mm = 3;     // along a direction of negative curvature, before the line search
 constexpr double worth_reduction = 0.1;   // and this far one that saves a new factor
 constexpr int undeformed_tries = 3;  // with what is kept, then made anew, then with a factor where that was a cycle
 constexpr Eigen::Index least_cycling = 3000;  // unknowns: a factor of fewer is as cheap as anything
@@ -38,13 +39,17 @@ int NewtonDirection::iterations_per_factor(int least, int most) const {
   return std::clamp(static_cast<int>(factor_->solves_per_factor()), least, most);
 }
 
+void NewtonDirection::evaluate(const State& state, bool convex, Sums& sums) const {
+  mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true, .convex = convex}, sums);
+}
+
 bool NewtonDirection::deformed(const State& state, double tolerance, double moved_mm, Sums& sums,
                                Eigen::VectorXd& step) {
-  exact_ = true, indefinite_ = false;
+  exact_ = true;
   const bool close = moved_mm < close_mm;
   if (!mechanics_.has_energy()) {  // ∂r/∂x is not symmetric: its lower half only preconditions
     if ((!have_factor_ || renew_factor_) && !factorise(state, tolerance, close, sums, nullptr)) return false;
-    if (!exact_) mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true}, sums);
+    if (!exact_) evaluate(state, false, sums);
     exact_ = true;  // the factor may be of a changed tangent, GMRES solves with the matrix itself
     const auto preconditioner = [this](const Eigen::VectorXd& in, Eigen::VectorXd& out) { factor_->solve(in, out); };
     return by_gmres(sums.whole_tangent(), preconditioner, tolerance, sums, step);
@@ -105,7 +110,7 @@ const SparseMatrix& NewtonDirection::whole(const Sums& sums) {
 }
 
 void NewtonDirection::forget() {
-  have_factor_ = false, shift_ = 0, cycle_failed_ = false;
+  have_factor_ = false, shift_ = 0, cycle_failed_ = false, indefinite_ = false;
   if (couplings_.nonZeros() == 0) return;
   couplings_.resize(0, 0);
   cycle_.reset();
@@ -125,32 +130,31 @@ void NewtonDirection::choose_solver(const SparseMatrix& pattern) {
 /// @param close  whether the last step was short
 /// @param step   the Newton step with the new factor, or nullptr when only the factor is wanted
 bool NewtonDirection::factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step) {
-  // The exact tangent where it is positive definite; where it is not, the one without the skin's negative curvature;
-  // and if the tissue's is negative too, with a shift not much larger than makes it so: tried from a little under the
-  // last one that did.
+  // The exact tangent where it is positive definite; where it is not, or was not a step ago, the one without negative
+  // curvature of tissue and skin; and if that will not do, with a shift not much larger than makes it do: tried from a
+  // little under the last one that did.
   double shift = 0;
   have_factor_ = true;
   for (int tangent = indefinite_ ? convex_tangent : exact_tangent; tangent < max_tangents; ++tangent) {
-    if (tangent == convex_tangent)
-      mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true, .convex = true}, sums);
-    else if (tangent == first_shifted)
+    exact_ = tangent == exact_tangent;
+    if (!exact_) evaluate(state, true, sums);
+    if (tangent == first_shifted)
       shift = std::max(first_shift * sums.tangent.diagonal().cwiseAbs().mean(), shift_ / shift_growth);
     else if (tangent > first_shifted)
       shift *= shift_growth;
     ++factorisations_;
-    const bool exact = tangent == exact_tangent;
-    exact_ = exact;
     const SparseMatrix& matrix = whole(sums);
     choose_solver(matrix);
+    convex_factor_ = !exact_;
     if (!factor_->factorise(matrix, shift)) {
       if (cycling() && close) return with_factor_instead(state, tolerance, close, sums, step);
       continue;
     }
     renew_factor_ = false;
-    const bool found = step == nullptr || step_with_new_factor(state, tolerance, shift, close, sums, *step);
+    const bool found = step == nullptr || step_with_new_factor(state, tolerance, shift, sums, *step);
     // A cycle of multigrid is no factor: it is good for a changed tangent, not for what that was changed from.
-    if (!exact && !factor_->direct()) renew_factor_ = true;
-    if (found && !exact) shift_ = shift;
+    if (convex_factor_ && !factor_->direct()) renew_factor_ = true;
+    if (found && convex_factor_) shift_ = shift;
     if (found) return true;
     // Near the answer a changed tangent creeps, and its cycle is too poor for the exact one: a factor serves there.
     if (cycling() && (close || !indefinite_)) return with_factor_instead(state, tolerance, close, sums, step);
@@ -163,30 +167,30 @@ bool NewtonDirection::factorise(const State& state, double tolerance, bool close
 bool NewtonDirection::with_factor_instead(const State& state, double tolerance, bool close, Sums& sums,
                                           Eigen::VectorXd* step) {
   cycle_failed_ = true;
-  if (!exact_) mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true}, sums);
+  if (!exact_) evaluate(state, false, sums);
   return factorise(state, tolerance, close, sums, step);
 }
 
-/// The step with the factor just made of sums.tangent + shift I.
-bool NewtonDirection::step_with_new_factor(const State& state, double tolerance, double shift, bool close, Sums& sums,
+/// The step with the factor just made of sums.tangent + shift I. Where that is a changed tangent it preconditions the
+/// exact one, if need be along a direction of negative curvature.
+bool NewtonDirection::step_with_new_factor(const State& state, double tolerance, double shift, Sums& sums,
                                            Eigen::VectorXd& step) {
-  const bool exact = exact_;
-  if (!exact && close && factor_->direct()) {
-    mechanics_.evaluate(state, Demand{.energy = true, .residual = true, .tangent = true}, sums);
-    const int affordable = iterations_per_factor(least_conjugate_gradients, max_conjugate_gradients);
+  if (convex_factor_) {
+    evaluate(state, false, sums);
+    const int affordable = factor_->direct() ? iterations_per_factor(least_conjugate_gradients, max_conjugate_gradients)
+                                             : max_conjugate_gradients;
     if (by_conjugate_gradients(tolerance, 0, affordable, sums, step)) return true;
+    exact_ = false;
+    if (!factor_->direct()) evaluate(state, true, sums);
   }
-  bool found = true;
-  if (factor_->direct())
-    factor_->solve(-sums.residual, step);
-  else
-    found = by_conjugate_gradients(tolerance, shift, max_conjugate_gradients, sums, step);
-  exact_ = exact;
-  return found && step.allFinite();
+  if (!factor_->direct()) return by_conjugate_gradients(tolerance, shift, max_conjugate_gradients, sums, step);
+  factor_->solve(-sums.residual, step);
+  return step.allFinite();
 }
 
 /// With the kept factor on sums.tangent + shift I. Sets exact_ and indefinite_ by whether that showed negative
-/// curvature.
+/// curvature; if it did, the step goes on along it, as far as longest_bend_mm (Steihaug 1983): the line search finds
+/// how far is good.
 bool NewtonDirection::by_conjugate_gradients(double tolerance, double shift, int max_iterations, const Sums& sums,
                                              Eigen::VectorXd& step) {
   const auto matrix = [&sums, shift](const Eigen::VectorXd& in, Eigen::VectorXd& out) {
@@ -197,13 +201,16 @@ bool NewtonDirection::by_conjugate_gradients(double tolerance, double shift, int
   const auto preconditioner = [this](const Eigen::VectorXd& in, Eigen::VectorXd& out) { factor_->solve(in, out); };
   KrylovOptions options{.tolerance = tolerance, .max_iterations = max_iterations};
   if (factor_->direct()) options.worthwhile_reduction = worth_reduction;
-  const KrylovReport report = krylov_.conjugate_gradients(matrix, preconditioner, -sums.residual, options, step);
+  const KrylovReport report =
+      krylov_.conjugate_gradients(matrix, preconditioner, -sums.residual, options, step, &bend_);
   renew_factor_ = report.iterations > max_iterations / 2;  // the factor is kept for as long as it is clearly cheaper
   indefinite_ = report.negative_curvature;
   exact_ = !indefinite_;
-  const double enough = indefinite_ && factor_->direct() ? usable_reduction : worth_reduction;
-  const bool usable = report.converged || ((factor_->direct() || !indefinite_) && report.reduction <= enough);
-  return usable && step.allFinite();
+  if (!indefinite_) return (report.converged || report.reduction <= worth_reduction) && step.allFinite();
+  const double longest = bend_.cwiseAbs().maxCoeff();
+  if (!convex_factor_ || !(longest > 0) || !(bend_.dot(sums.residual) < 0)) return false;
+  step += longest_bend_mm / longest * bend_;
+  return step.allFinite();
 }
 
 /// With the kept factor, maybe of another matrix, inside @p preconditioner.

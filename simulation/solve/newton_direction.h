@@ -14,11 +14,11 @@ namespace supine::simulation {
 /// One factor of ∂r/∂x (or, on large meshes, one multigrid hierarchy) is kept and used as preconditioner for as long as
 /// Krylov iterations with it are cheaper than a new one. On quadratic cells a cycle of p-multigrid stands in its place,
 /// made anew for every tangent; where cells are nearly incompressible, or it does not come to a solution, the factor.
-/// Where ∂r/∂x is not positive definite a changed one that is gets factorised, and close to the answer conjugate
-/// gradients with it on ∂r/∂x itself find the step, up to where they meet a direction of negative curvature: the
-/// changed tangent alone is too stiff and creeps. -∂r/∂X is close to ∂r/∂x F (moving a point of the body together with
-/// its place leaves what is balanced balanced), so the same factor serves the inverse solve, whose matrix is not
-/// symmetric and would cost three times as much to factorise.
+/// Where ∂r/∂x is not positive definite, the one without negative curvature (Demand::convex) is factorised, and
+/// conjugate gradients with it on ∂r/∂x itself find the step, up to where they meet a direction of negative curvature
+/// and some millimetres along that: the changed tangent alone is too stiff and creeps. -∂r/∂X is close to ∂r/∂x F
+/// (moving a point of the body together with its place leaves what is balanced balanced), so the same factor serves the
+/// inverse solve, whose matrix is not symmetric and would cost three times as much to factorise.
 class NewtonDirection {
  public:
   /// @param mechanics  must outlive the object
@@ -26,7 +26,7 @@ class NewtonDirection {
 
   /// Step for the deformed shape.
   /// @param sums  residual, energy and tangent at @p state; where that tangent is not positive definite it is evaluated
-  ///   again with Demand::convex, and may be left so
+  ///   with Demand::convex too, and may be left so
   /// @param tolerance  of the linear solve, relative to |r|, in (0, 1)
   /// @param moved_mm   how far the last step went: what says whether the kept factor is still close
   /// @param step  out: s, mm, dof 3 node + axis; one of descent of the energy where there is one
@@ -54,8 +54,8 @@ class NewtonDirection {
  private:
   bool factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step);
   bool with_factor_instead(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step);
-  bool step_with_new_factor(const State& state, double tolerance, double shift, bool close, Sums& sums,
-                            Eigen::VectorXd& step);
+  void evaluate(const State& state, bool convex, Sums& sums) const;
+  bool step_with_new_factor(const State& state, double tolerance, double shift, Sums& sums, Eigen::VectorXd& step);
   bool by_conjugate_gradients(double tolerance, double shift, int max_iterations, const Sums& sums,
                               Eigen::VectorXd& step);
   bool by_gmres(const SparseMatrix& matrix, const LinearMap& preconditioner, double tolerance, const Sums& sums,
@@ -71,13 +71,14 @@ class NewtonDirection {
   SparseMatrix couplings_;                    // zeros: of the mesh and all that has touched; empty while nothing has
   SparseMatrix whole_;                        // work space
   Krylov krylov_;
-  Eigen::VectorXd preconditioned_residual_;  // work space
+  Eigen::VectorXd preconditioned_residual_, bend_;  // work space
   bool have_factor_ = false;
   bool renew_factor_ = false;  // the last Krylov solve cost more than a new factor would
   bool exact_ = true;
-  bool indefinite_ = false;    // this step's exact tangent has shown negative curvature: it has no Cholesky factor
-  double shift_ = 0;           // of the tangent that was factorised last when the exact one was not positive definite
-  bool cycle_failed_ = false;  // p-multigrid did not come to a solution: not tried again
+  bool convex_factor_ = false;  // the kept factor is of a changed tangent
+  bool indefinite_ = false;     // the last exact tangent that was asked has shown negative curvature
+  double shift_ = 0;            // of the tangent that was factorised last when the exact one was not positive definite
+  bool cycle_failed_ = false;   // p-multigrid did not come to a solution: not tried again
   int factorisations_ = 0;
 };
 

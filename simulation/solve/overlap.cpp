@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <numeric>
+#include <set>
 #include <vector>
 
 #include "simulation/terms/skin_pairs.h"
@@ -88,16 +89,43 @@ Overlap find_overlap(const meshing::TetMesh& mesh, const Indices& skin, const Po
   return overlap;
 }
 
-std::string overlap_warning(const std::string& name, const Overlap& overlap, const ContactSettings& settings) {
-  if (overlap.deepest_mm <= settings.band_mm) return {};
+Overlap find_in_chest(const meshing::ChestBeside& chest, const Indices& skin, const Points& shape) {
+  Overlap overlap;
+  const std::set<int> nodes(skin.data(), skin.data() + skin.size());
+  for (const int node : nodes) {
+    const auto at = chest.at(shape.row(node).transpose());
+    if (at.share < 1 || at.gap_mm >= 0) continue;
+    ++overlap.samples;
+    if (-at.gap_mm > overlap.deepest_mm)
+      overlap.deepest_mm = -at.gap_mm, overlap.place_mm = shape.row(node).transpose();
+  }
+  return overlap;
+}
+
+std::string in_chest_warning(const std::string& name, const Overlap& overlap, const ContactSettings& settings) {
+  constexpr double told_mm = 3;
+  if (overlap.deepest_mm <= told_mm) return {};
   const Eigen::Vector3d& at = overlap.place_mm;
   return fmt::format(
-      "{}: skin passes through skin, {:.1f} mm deep at ({:.1f}, {:.1f}, {:.1f}) mm{}", name, overlap.deepest_mm, at.x(),
-      at.y(), at.z(),
-      settings.kind == ContactKind::off
-          ? "; [contact] kind = \"skin\" in the model keeps skins apart"
-          : ", contact notwithstanding: pairs that were left out, or contact.stiffness_kpa_per_mm is too "
-            "low");
+      "{}: skin lies up to {:.1f} mm inside the chest beside the breast, at ({:.1f}, {:.1f}, {:.1f}) mm{}", name,
+      overlap.deepest_mm, at.x(), at.y(), at.z(),
+      settings.with_chest()
+          ? ", contact notwithstanding: it lies there free of load, or contact.stiffness_kpa_per_mm is too low"
+          : "; [contact] kind = \"chest\" in the model lays it on it");
+}
+
+std::string overlap_warning(const std::string& name, const Overlap& overlap, const ContactSettings& settings,
+                            int folded_cells) {
+  if (overlap.deepest_mm <= settings.band_mm) return {};
+  const Eigen::Vector3d& at = overlap.place_mm;
+  const std::string doubt =
+      folded_cells > 0 ? fmt::format(" (the depth may be wrong: {} cells are folded)", folded_cells) : std::string();
+  return fmt::format("{}: skin passes through skin, {:.1f} mm deep at ({:.1f}, {:.1f}, {:.1f}) mm{}{}", name,
+                     overlap.deepest_mm, at.x(), at.y(), at.z(), doubt,
+                     !settings.with_skin()
+                         ? "; [contact] kind = \"skin\" in the model keeps skins apart"
+                         : ", contact notwithstanding: pairs that were left out, or contact.stiffness_kpa_per_mm is "
+                           "too low");
 }
 
 }  // namespace supine::simulation

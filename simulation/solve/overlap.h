@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "meshing/anatomy/chest_beside.h"
 #include "meshing/tet_mesh.h"
 #include "simulation/model.h"
 
@@ -20,7 +21,16 @@ struct Overlap {
 /// @param skin   faces of the skin, #F by 3 or 6   @param shape  #N by 3, mm
 Overlap find_overlap(const meshing::TetMesh& mesh, const Indices& skin, const Points& shape);
 
-/// What to tell the user of it; empty where it is within the band. @param name  of the shape, for example "supine"
-std::string overlap_warning(const std::string& name, const Overlap& overlap, const ContactSettings& settings);
+/// The same of the chest beside the breast: nodes of the skin that lie in it, where it is there in full.
+Overlap find_in_chest(const meshing::ChestBeside& chest, const Indices& skin, const Points& shape);
+
+/// What to tell the user of it; empty where it is not deeper than a scan shows. @param name  of the shape
+std::string in_chest_warning(const std::string& name, const Overlap& overlap, const ContactSettings& settings);
+
+/// What to tell the user of overlapping skin; empty where it is within the band. @param name  of the shape, for example
+/// "supine"
+/// @param folded_cells  of the shape (folds.h): beside them the depth cannot be trusted, and the text says so
+std::string overlap_warning(const std::string& name, const Overlap& overlap, const ContactSettings& settings,
+                            int folded_cells = 0);
 
 }  // namespace supine::simulation

@@ -85,6 +85,22 @@ struct CellStrain {
   }
 };
 
+constexpr Demand unit_demand{.residual = true, .tangent = true};
+
+Tangent9 tangent_of(const InvariantStrain& strain, const InvariantResponse<double>& response) {
+  ElementSums<3> sums;
+  sums.clear(unit_demand);
+  add_invariant_point<3>(strain, response, unit_gradients, 1, unit_demand, sums);
+  return point_tangent(sums, true);
+}
+
+Tangent9 tangent_of(const PolarPoint& polar, const BulkMaterial<double>& m, double pressure) {
+  ElementSums<3> sums;
+  sums.clear(unit_demand);
+  add_polar_point<3>(polar, m, pressure, unit_gradients, 1, unit_demand, sums);
+  return point_tangent(sums, true);
+}
+
 VolumeStrain mean_strain(BulkLaw law, double mean) {
   if (law == BulkLaw::corotational) return {mean, 1, 0};
   return volume_strain(law, mean);
@@ -169,6 +185,7 @@ void BulkTerm<Element>::add_cell(int e, const State& state, const Demand& demand
   const double pressure = excess * strain_of_pressure * mean.first;
   if (demand.energy) local.energy += 0.5 * excess * strain.volume * mean.value * mean.value;
 
+  const bool convex = demand.convex && demand.tangent;
   ElementSums<n> sums;
   sums.clear(demand);
   for (const auto& point : strain.points) {
@@ -183,18 +200,21 @@ void BulkTerm<Element>::add_cell(int e, const State& state, const Demand& demand
       response.wl += pressure * det_f;
       response.wll += pressure * det_f;
       add_invariant_point<n>(s, response, place.b, place.volume, demand, sums);
+      if (convex) take_off_negative_curvature<n>(tangent_of(s, response), place.b, place.volume, sums);
       if (slopes) strain.add_slope(point, det_f * (place.b * s.g.transpose()));
     } else if (law == BulkLaw::corotational) {
       const PolarPoint polar(f);
       if (demand.energy) local.energy += place.volume * polar.energy(material);
       add_polar_point<n>(polar, material, pressure, place.b, place.volume, demand, sums);
+      if (convex) take_off_negative_curvature<n>(tangent_of(polar, material, pressure), place.b, place.volume, sums);
       if (slopes) strain.add_slope(point, place.b * polar.r.transpose());
     } else {
       add_qr_point<n>(f, rest_edges<n>(rest), material, place.b, place.volume, edge_ends<n>(), demand, sums);
     }
   }
   if (slopes) {
-    strain.add_mean(excess * (mean.first * mean.first + strain_of_pressure * mean.second), demand, sums);
+    const double stiffness = excess * (mean.first * mean.first + strain_of_pressure * mean.second);
+    strain.add_mean(convex ? std::max(stiffness, 0.0) : stiffness, demand, sums);
     sums.force += (excess * (mean.value - strain_of_pressure) * mean.first) * strain.by_x;
   }
   sums.write(demand, law != BulkLaw::corotational_qr, local);

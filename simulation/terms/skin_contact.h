@@ -4,29 +4,12 @@
 #include <memory>
 #include <vector>
 
-#include "meshing/anatomy/muscle_distance.h"
 #include "simulation/model.h"
+#include "simulation/terms/contact_figures.h"
 #include "simulation/terms/contact_point.h"
 #include "simulation/terms/term.h"
 
 namespace supine::simulation {
-
-/// Pairs of faces of the skin that contact leaves alone because they overlap, or lie within the band, in a shape that
-/// must be free of force.
-struct LeftOut {
-  int pairs = 0;
-  double deepest_mm = 0;                               ///< the smallest gap, negative where they overlap
-  Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();  ///< there
-};
-
-/// What touches in one shape.
-struct ContactFigures {
-  double area_cm2 = 0;      ///< of the skin that is pressed upon, both sides counted, in that shape
-  double pressure_kpa = 0;  ///< greatest, over the shape's area
-  double overlap_mm = 0;    ///< deepest; 0 where skins keep apart
-  Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();  ///< of the deepest
-  Eigen::VectorXd face_kpa;                            ///< #skin faces, mean over the face
-};
 
 /// Skin on skin, without friction: energy Σ_p A_p/2 × coverage × contact_energy(gap) over the samples p of both skins
 /// (contact_point.h), A_p the imaged area, so that nothing in it depends on the undeformed shape. Forces and moments of

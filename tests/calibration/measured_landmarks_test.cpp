@@ -86,5 +86,26 @@ TEST(MeasuredLandmarks, AreRefusedWhereTwoHaveChangedNames) {
   EXPECT_NE(exchanged.find("exchanged"), std::string::npos) << exchanged;
 }
 
+TEST(MeasuredLandmarks, ADoubtIsToldWhereAFactorExplainsWhatIsOff) {
+  const Points there = measured().points;
+  const Eigen::RowVector3d middle = there.colwise().mean(), moved = middle + Eigen::RowVector3d(3, 4, 0);
+  const auto spread_by = [&](double factor) {
+    MeasuredLandmarks landmarks = pairs();
+    landmarks.measured = (factor * (there.rowwise() - middle)).rowwise() + moved;
+    return landmarks;
+  };
+  EXPECT_EQ(doubt_of_scale(spread_by(1), there), "");
+  EXPECT_EQ(doubt_of_scale(spread_by(1.1), there), "");
+  EXPECT_NE(doubt_of_scale(spread_by(1.3), there).find("3 landmarks are spread 1.30 times"), std::string::npos);
+  EXPECT_NE(doubt_of_scale(spread_by(0.75), there).find("spread 0.75 times"), std::string::npos);
+  EXPECT_NE(doubt_of_scale(spread_by(1.3), there).find(" 0.0 mm without"), std::string::npos);
+  MeasuredLandmarks vague = spread_by(1.3);
+  vague.sigma_mm.setConstant(20);
+  EXPECT_EQ(doubt_of_scale(vague, there), "") << "within what the file says of its errors";
+  MeasuredLandmarks otherwise = spread_by(1.3);
+  otherwise.measured.col(1) += Eigen::Vector3d(40, -40, 0);
+  EXPECT_EQ(doubt_of_scale(otherwise, there), "") << "no factor explains that";
+}
+
 }  // namespace
 }  // namespace supine::calibration

@@ -2,6 +2,7 @@
 #include "common/outputs.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -64,6 +65,21 @@ TEST_F(OutputsTest, ExistingFilesNeedForce) {
   EXPECT_EQ(text(folder / "a.txt"), "old");
   forced.commit();
   EXPECT_EQ(text(folder / "a.txt"), "new");
+}
+
+TEST_F(OutputsTest, WhatIsNoFileIsNeverReplaced) {
+  const fs::path pipe = folder / "pipe.txt", inner = folder / "inner.txt";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  fs::create_directories(inner);
+  for (const bool force : {false, true})
+    for (const fs::path& target : {pipe, inner}) {
+      Outputs outputs(force);
+      EXPECT_THROW(outputs.stage(target), InputError) << target;
+      outputs.commit();
+    }
+  EXPECT_TRUE(fs::is_fifo(pipe));
+  EXPECT_TRUE(fs::is_directory(inner));
+  EXPECT_EQ(files(), 2u);
 }
 
 TEST_F(OutputsTest, AFolderThatCannotBeMadeIsRefused) {

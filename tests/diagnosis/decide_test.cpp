@@ -34,7 +34,7 @@ Diagnosis decided(const std::vector<Hypothesis>& list, const Unexplained& left, 
   const Priors priors;
   auto included = inclusions(list, effects, priors);
   for (Inclusion& one : included) one.left_out_gain = gain;
-  return decide(list, effects, included, left, priors);
+  return decide(list, effects, included, left, priors, {});
 }
 
 using Names = std::vector<std::string>;
@@ -106,7 +106,7 @@ TEST(Decide, WhatIsExpectedAndLeftOpenIsToldApartFromNothingElse) {
   Priors priors;
   priors.expected = {"ligament", "adhesion"};
   const auto decided = [&](const std::vector<Hypothesis>& list) {
-    return decide(list, effects, inclusions(list, effects, priors), little, priors);
+    return decide(list, effects, inclusions(list, effects, priors), little, priors, {});
   };
   // Both tell the same story, a third one less well: neither has a Bayes factor of 3.
   const Diagnosis open = decided(hypotheses({{{0}, 0.4}, {{1}, 0.3}, {{2}, 0.1}}));
@@ -119,6 +119,25 @@ TEST(Decide, WhatIsExpectedAndLeftOpenIsToldApartFromNothingElse) {
   EXPECT_EQ(likelier.verdict, Verdict::ambiguous);
   EXPECT_EQ(likelier.missing, Names{"ligament"});
   EXPECT_EQ(decided(hypotheses({{{0}, 0.45}})).verdict, Verdict::nothing_missing);
+}
+
+TEST(Decide, WhatIsExpectedAndCannotBeSeenIsNotCalledAbsent) {
+  Priors priors;
+  priors.expected = {"ligament"};
+  const auto decided = [&](double probability, const Names& unseen) {
+    const auto list = hypotheses({{{0}, probability}});
+    return decide(list, effects, inclusions(list, effects, priors), little, priors, unseen);
+  };
+  const Diagnosis blind = decided(0.2, {"ligament"});
+  EXPECT_EQ(blind.verdict, Verdict::ambiguous);
+  EXPECT_EQ(blind.missing, Names{"ligament"});
+  EXPECT_NE(blind.why.find("could not show ligament"), std::string::npos) << blind.why;
+  EXPECT_EQ(decided(0.2, {"adhesion"}).verdict, Verdict::nothing_missing) << "nobody expects it";
+  const Diagnosis looked_for = decided(0.2, {});
+  EXPECT_EQ(looked_for.verdict, Verdict::nothing_missing);
+  EXPECT_EQ(looked_for.ambiguous_rest, Names{"ligament"}) << "a small one may be there all the same";
+  EXPECT_TRUE(decided(0.01, {}).ambiguous_rest.empty());
+  EXPECT_EQ(decided(0.01, {"ligament"}).verdict, Verdict::nothing_missing) << "excluded";
 }
 
 }  // namespace

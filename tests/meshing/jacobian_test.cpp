@@ -81,7 +81,7 @@ TEST(Jacobian, CoefficientsHoldTheDeterminantBetweenThem) {
     const auto c = meshing::jacobian_coefficients(x);
     const auto [low, high] = std::minmax_element(c.begin(), c.end());
     for (int k = 0; k < 4; ++k) EXPECT_NEAR(c[k], determinant_at(x, Eigen::Vector4d::Unit(k)), 1e-12);
-    on_grid(12, [&](const Eigen::Vector4d& l) {
+    on_grid(12, [&, low = low, high = high](const Eigen::Vector4d& l) {
       EXPECT_GE(determinant_at(x, l), *low - 1e-12);
       EXPECT_LE(determinant_at(x, l), *high + 1e-12);
     });

@@ -88,6 +88,17 @@ TEST_F(MeshFile, PoseGivesBackProneAndPositions) {
   EXPECT_EQ(pose.point_arrays[0].second, force);
 }
 
+TEST_F(MeshFile, APoseIsNotTakenForAnother) {
+  const meshing::TetMesh mesh = mixed_mesh();
+  const auto named = folder_ / "named.vtu", nameless = folder_ / "nameless.vtu";
+  meshing::write_pose(mesh, mesh.points, {}, {}, named, "left", "undeformed");
+  meshing::write_pose(mesh, mesh.points, {}, {}, nameless);
+  EXPECT_NO_THROW(meshing::read_pose(named, "undeformed"));
+  EXPECT_NO_THROW(meshing::read_pose(named));
+  EXPECT_NO_THROW(meshing::read_pose(nameless, "supine"));
+  EXPECT_THROW(meshing::read_pose(named, "supine"), InputError);
+}
+
 TEST_F(MeshFile, PoseArraysMustFitTheMesh) {
   const meshing::TetMesh mesh = mixed_mesh();
   EXPECT_THROW(meshing::write_pose(mesh, mesh.points.topRows(3), {}, {}, folder_ / "x.vtu"), InputError);
@@ -144,8 +155,8 @@ TEST_F(MeshFile, RefusesCellsWithOtherNodesThanTheirKindHas) {
   EXPECT_NE(refusal(one_cell("0 1 2 3 4", 5, 10)).find("cell 0 has 5 nodes; its kind has 4"), std::string::npos);
   EXPECT_NE(refusal(one_cell("0 1 2", 3, 10)).find("cell 0 has 3 nodes; its kind has 4"), std::string::npos);
   EXPECT_NE(refusal(one_cell("0 1 2 3", 4, 24)).find("cell 0 has 4 nodes; its kind has 10"), std::string::npos);
-  EXPECT_NE(refusal(one_cell("0 1 2 7", 4, 10)).find("cell 0 names node 7, the file has 5"), std::string::npos);
-  EXPECT_NE(refusal(one_cell("0 1 2 -1", 4, 10)).find("cell 0 names node -1"), std::string::npos);
+  EXPECT_NE(refusal(one_cell("0 1 2 7", 4, 10)).find("cell 0 names point 7, the file has 5"), std::string::npos);
+  EXPECT_NE(refusal(one_cell("0 1 2 -1", 4, 10)).find("cell 0 names point -1"), std::string::npos);
 }
 
 TEST_F(MeshFile, DamagedIsReadOrRefusedNeverWorse) {

@@ -105,7 +105,8 @@ TEST(Nuisances, SigmaIsThatOfTheCausesOwnParameters) {
   for (const std::string& name : catalogue_causes())
     for (const auto& [parameter, sigma] : nuisance_sigma(name)) {
       const auto& rows = simulation::find_effect(name)->parameters();
-      EXPECT_TRUE(std::any_of(rows.begin(), rows.end(), [&](const auto& row) { return row.name == parameter; }))
+      EXPECT_TRUE(
+          std::any_of(rows.begin(), rows.end(), [&name = parameter](const auto& row) { return row.name == name; }))
           << name << "." << parameter;
       EXPECT_GT(sigma, 0);
     }

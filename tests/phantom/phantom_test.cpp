@@ -109,7 +109,8 @@ TEST(Causes, AreDrawnWithinTheCataloguesRanges) {
     for (std::uint64_t seed = 1; seed <= 50; ++seed)
       for (const auto& [key, value] : draw_cause(name, seed).values) {
         const auto& rows = effect->parameters();
-        const auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& r) { return r.name == key; });
+        const auto row =
+            std::find_if(rows.begin(), rows.end(), [&wanted = key](const auto& r) { return r.name == wanted; });
         ASSERT_NE(row, rows.end()) << name << "." << key;
         EXPECT_GE(value, row->lower) << name << "." << key;
         EXPECT_LE(value, row->upper) << name << "." << key;

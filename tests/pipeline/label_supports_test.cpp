@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <nlohmann/json.hpp>
+#include <random>
 #include <sstream>
 
+#include "calibration/model_skin.h"
 #include "meshing/mesh_io.h"
 #include "meshing/supports.h"
 #include "meshing/topology.h"
@@ -42,7 +46,7 @@ kind = "sliding"
 kind = "fixed"
 )";
 
-/// 0 air, 1 block, 2 clamp, 3 table, 4 a pin of one voxel's width under the free end.
+/// 0 air, 1 block, 2 clamp, 3 table, 4 a pin of 4 by 6 mm under the free end.
 void write_labels(const std::filesystem::path& file) {
   const Eigen::Vector3i inside = (size_mm / voxel_mm).cast<int>(), all = inside.array() + 2 * margin;
   std::string voxels;
@@ -52,7 +56,7 @@ void write_labels(const std::filesystem::path& file) {
         const double x = (i + 0.5) * voxel_mm, z = (k + 0.5) * voxel_mm;
         const bool beside = k < 0 || k >= inside.z() || j < 0 || j >= inside.y() || i >= inside.x();
         const bool below = j < 0 && x > table_x_mm[0] && x < table_x_mm[1] && z > table_z_mm[0] && z < table_z_mm[1];
-        const bool pin = j < 0 && i == inside.x() - 2 && k == 5;
+        const bool pin = j < 0 && i >= inside.x() - 3 && i < inside.x() - 1 && k >= 4 && k < 7;
         voxels.push_back(static_cast<char>(below ? 3 : pin ? 4 : beside ? 0 : i < 0 ? 2 : 1));
       }
   const double first = (0.5 - margin) * voxel_mm;
@@ -147,6 +151,50 @@ TEST(LabelSupports, HoldABlockAsTheSameOnesOfASurfaceDo) {
   RecordProperty("end_mm", fmt::format("{:.3f} {:.3f} {:.3f}", ours.end_mm.x(), ours.end_mm.y(), ours.end_mm.z()));
   RecordProperty("mean_difference_mm", fmt::format("{:.3f}", (ours.mean_mm - theirs.mean_mm).norm()));
   RecordProperty("end_difference_mm", fmt::format("{:.3f}", (ours.end_mm - theirs.end_mm).norm()));
+}
+
+constexpr double scan_noise_mm = 0.2;
+
+/// The skin of a pose with noise along its normals: a scan whose truth is known.
+void write_scan_of(const std::filesystem::path& pose_file, const std::filesystem::path& scan) {
+  const meshing::PoseMesh pose = meshing::read_pose(pose_file);
+  const calibration::ModelSkin skin(pose.mesh, pose.positions);
+  reconstruction::Surface surface;
+  surface.points = skin.node_points();
+  surface.triangles = skin.triangles();
+  for (int& node : surface.triangles.reshaped())
+    node = static_cast<int>(std::lower_bound(skin.nodes().begin(), skin.nodes().end(), node) - skin.nodes().begin());
+  const Points normals = skin.node_normals();
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, scan_noise_mm);
+  for (Eigen::Index p = 0; p < surface.points.rows(); ++p) surface.points.row(p) += noise(random) * normals.row(p);
+  reconstruction::write_surface(surface, scan);
+}
+
+TEST(LabelSupports, AModulusIsFoundAndNothingElseIsMissing) {
+  const TemporaryFolder folder;
+  const std::filesystem::path block = folder / "block";
+  write_label_case(block, "air = [0, 4]\nsupport.clamp = [2]\nsupport.table = [3]\n");
+  ASSERT_EQ(make(block, "simulate").code, 0);
+  write_scan_of(block / "out/tilted.vtu", block / "scan.vtp");
+  write_text(block / "case.toml", read_text(block / "case.toml") + "surface = \"scan.vtp\"\nnoise_mm = 0.2\n");
+  write_text(block / "model.toml",
+             replaced(model, "young_modulus_kpa = 5",
+                      "young_modulus_kpa = { value = 8, prior_sd = 8, lower = 0.5, upper = 100 }"));
+  const Finished fitted = make(block, "calibrate");
+  ASSERT_EQ(fitted.code, 0) << fitted.out << fitted.err;
+  const auto found = nlohmann::json::parse(read_text(block / "out/calibration.json"))["parameters"][0];
+  EXPECT_NEAR(found["value"].get<double>(), 5, 0.3);
+  EXPECT_LT(found["interval95"][0].get<double>(), 5);
+  EXPECT_GT(found["interval95"][1].get<double>(), 5);
+  const Finished asked =
+      run_process({tool("diagnose"), block.string(), (block / "out/mesh.vtu").string(), "--model",
+                   (block / "out/model.toml").string(), "--no-other-meshes", "-o", (block / "asked").string()});
+  ASSERT_EQ(asked.code, 0) << asked.err;
+  const auto diagnosis = nlohmann::json::parse(read_text(block / "asked/diagnosis.json"));
+  EXPECT_EQ(diagnosis["verdict"], "nothing_missing") << asked.out;
+  for (const char* word : {"nipple", "muscle", "quadrant", "prone"})
+    EXPECT_EQ((asked.out + fitted.out).find(word), std::string::npos) << word << " in\n" << fitted.out << asked.out;
 }
 
 TEST(LabelSupports, OneThatNoFaceOfTheMeshLiesOnIsRefused) {

@@ -93,6 +93,36 @@ TEST_F(SurfaceFiles, BarePointsStayPoints) {
   EXPECT_EQ(read_surface(write("p.obj", "v 1 2 3\nv 4 5 6\nv 7 8 9\n")).points.rows(), 3);
 }
 
+TEST_F(SurfaceFiles, WhatStandsTwiceIsReadOnce) {
+  std::string points = "0 0 0\n10 0 0\n0 20 0\n0 0 30\n", again = "3 4 6 5\n3 4 5 7\n3 5 6 7\n3 4 7 6\n";
+  const std::string doubled = replaced(ply("", tetrahedron_faces + again, 8), "vertex 4", "vertex 8");
+  const Surface twice = read_surface(write("twice.ply", replaced(doubled, points, points + points)));
+  const Surface once = read_surface(write("once.ply", ply("")));
+  EXPECT_EQ(twice.triangles, once.triangles) << "with points of its own";
+  EXPECT_EQ(twice.points, once.points);
+  const Surface cloud = read_surface(write("cloud.ply",
+                                           "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\n"
+                                           "property float y\nproperty float z\nend_header\n"
+                                           "1 2 3\n4 5 6\n1 2 3\n1 2 4\n"));
+  ASSERT_EQ(cloud.points.rows(), 3);
+  EXPECT_EQ(cloud.points.row(1), Eigen::RowVector3d(4, 5, 6));
+  EXPECT_EQ(cloud.points.row(2), Eigen::RowVector3d(1, 2, 4));
+}
+
+TEST_F(SurfaceFiles, AnObjWithPartsLinesAndPointsGivesItsFaces) {
+  const Surface read = read_surface(write("a.obj",
+                                          "o a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\no b\nl 1 2\np 3\n"
+                                          "vn 0 0 1\nvt 0 0\nf 1/1/1 2/1/1 3/1/1\nf -4 -2 -1\n"));
+  EXPECT_EQ(read.triangles.rows(), 2);
+  EXPECT_EQ(read.points.rows(), 4);
+}
+
+TEST_F(SurfaceFiles, EndingsMayBeInCapitals) {
+  EXPECT_EQ(read_surface(write("A.PLY", ply(""))).triangles.rows(), 4);
+  write_surface(ball(10, 0), folder_ / "B.VTP");
+  EXPECT_EQ(read_surface(folder_ / "B.VTP").triangles.rows(), 20);
+}
+
 TEST_F(SurfaceFiles, PlyTextAndItsFrame) {
   const SurfaceFile bare = read_surface_file(write("a.ply", ply("")));
   EXPECT_FALSE(bare.frame);
@@ -167,10 +197,12 @@ TEST_F(SurfaceFiles, EachRefusalNamesTheFileAndTheFault) {
   expect(refusal("both.ply", ply("comment frame LPS\ncomment frame RAS\n")), {"both.ply", "LPS", "RAS"});
   expect(refusal("frame.ply", ply("comment frame XYZ\n")), {"XYZ"});
   expect(refusal("unit.ply", ply("comment unit m\n")), {"\"m\"", "mm"});
+  expect(refusal("line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
+         {"line.obj", "none of its 1 triangles has an area"});
   expect(refusal("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"), {"index.obj", "line 4", "4", "3"});
   expect(refusal("empty.obj", "# nothing\n"), {"empty.obj", "no vertices"});
   expect(refusal("a.stl", "hello"), {"a.stl", "not an STL"});
-  expect(refusal("a.vtp", "<VTKFile"), {"a.vtp", "cannot be read"});
+  expect(refusal("a.vtp", "<VTKFile"), {"a.vtp", "not a readable"});
   expect(message_of([this] { read_surface(write("ok.ply", ply("")), "XYZ"); }), {"XYZ", "LPS", "RAS"});
 }
 

@@ -17,7 +17,7 @@ using testing::message_of;
 GreyImage row_of(const std::vector<float>& values) {
   GreyImage image;
   image.grid.size = {static_cast<int>(values.size()), 1, 1};
-  image.grid.spacing_mm = {2, 3, 5};
+  image.grid.spacing_mm = {2, 4, 5};
   image.voxels = values;
   return image;
 }
@@ -54,6 +54,18 @@ TEST(SupportVoxels, EachMustTouchTissue) {
       << apart;
 }
 
+TEST(SupportVoxels, ATouchThatIsNoiseOfTheLabelsIsRefused) {
+  GreyImage image = row_of({7, 1, 8});
+  const auto complaint = [&] {
+    return message_of([&] { check_supports(mark_supports(image, two), tissues_of(image), "labels.nrrd"); });
+  };
+  EXPECT_EQ(complaint(), "") << "20 mm2";
+  image.grid.spacing_mm = {9, 4, 4.9};
+  EXPECT_NE(complaint().find("support 'clamp' (1 voxels, first at (0.0, 0.0, 0.0) mm) touches tissue on 19.6 mm2 only"),
+            std::string::npos)
+      << complaint();
+}
+
 TEST(SupportVoxels, TheNearestIsFoundInMillimetresOnATurnedGrid) {
   GreyImage image;
   image.grid.size = {9, 9, 9};
@@ -71,6 +83,12 @@ TEST(SupportVoxels, TheNearestIsFoundInMillimetresOnATurnedGrid) {
   EXPECT_EQ(nearest({4, 3.2, 4}), 1) << "4.8 mm against 5.1 mm";
   EXPECT_EQ(nearest({40, 4, 4}), 0) << "outside of the image";
   EXPECT_EQ(nearest({4, -30, 4}), 1);
+}
+
+TEST(SupportVoxels, WithoutAVoxelNoneIsTheNearest) {
+  const GreyImage image = row_of({0, 1, 0});
+  const std::string complaint = message_of([&] { nearest_support(mark_supports(image, two), image.grid, {0, 0, 0}); });
+  EXPECT_EQ(complaint, "the labels hold no voxel of a support");
 }
 
 }  // namespace

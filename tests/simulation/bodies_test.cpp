@@ -80,6 +80,25 @@ TEST(ImagedPose, WithoutGravityNothingMoves) {
   EXPECT_LT(solution.round_trip_max_mm, 1e-9);
 }
 
+// An end of what bodies may be: nearly incompressible hard rubber without a skin.
+
+TEST(Rubber, OfTenMegapascalBendsAsABeamDoes) {
+  constexpr double length = 100, width = 20, young_kpa = 1e4;
+  const testing::TestScene scene = testing::bar_scene(length, width, 10, 2);
+  Model model = rubber(young_kpa);
+  model.breast.poisson_ratio.value = 0.4995;
+  const ChainSolution solution =
+      solve_chain(scene.mesh, scene.anatomy, model, {{free_of_load, Eigen::Vector3d::Zero()}, {"hanging", down}});
+  // q L⁴ / 8 E I of bending and 1.2 q L² / 2 G A of shear, G = E/3.
+  const double load = 1000e-9 * 9810 * width * width, inertia = std::pow(width, 4) / 12;
+  const double beam = load * std::pow(length, 4) / (8 * young_kpa * inertia) +
+                      1.2 * load * length * length / (2 * young_kpa / 3 * width * width);
+  const double falls = -(solution.poses[0].x - scene.mesh.points).col(1).minCoeff();
+  // The clamp keeps the section from narrowing, so that the bar is a little shorter than the beam.
+  EXPECT_LT(falls, beam);
+  EXPECT_GT(falls, 0.9 * beam);
+}
+
 TEST(ImagedPose, AChainThatStartsElsewhereIsRefused) {
   const testing::TestScene scene = testing::bar_scene(100, 20, 4, 1);
   EXPECT_THROW(Chain(scene.mesh, scene.anatomy, rubber(300), {{"prone", down}}), InputError);
@@ -137,6 +156,38 @@ TEST(SupportCompliance, TurnsByItsMomentAndShiftsByItsForce) {
   EXPECT_NEAR(-motion.shift.y(), shift, 1e-3 * shift);
   const double turn_deg = motion.turn.z() * 180 / std::numbers::pi;  // the free end, at -x, goes down
   EXPECT_NEAR(turn_deg, turn_deg_per_nm * moment_nm, 2e-3 * turn_deg_per_nm * moment_nm);
+}
+
+/// Stiffness along the normal under each support of two: a clamp that is fixed, a table of another kind.
+std::vector<double> stiffness_under(const testing::TestScene& scene, const Model& model) {
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  const auto fields = values_of(make_fields(model, {scene.mesh, scene.anatomy, layout, "supine"}, down));
+  const Eigen::Index points = fields.interface_normal.size() / layout.support_begin.back();
+  return {fields.interface_normal[0], fields.interface_normal[points * layout.support_begin[1]]};
+}
+
+TEST(SupportCompliance, OfAllSupportsThoseThatSlideAreLeftAlone) {
+  testing::TestScene scene = testing::dome_scene();
+  scene.mesh.support_names = {"clamp", "table"};
+  scene.mesh.muscle_support.resize(scene.mesh.muscle.triangles.rows());
+  for (Eigen::Index t = 0; t < scene.mesh.muscle_support.size(); ++t)
+    scene.mesh.muscle_support[t] = scene.mesh.muscle.points(scene.mesh.muscle.triangles(t, 0), 0) > 0;
+  Model model = testing::soft_model();
+  const Effect& compliance = *find_effect("support_compliance");
+  EXPECT_FALSE(compliance.belongs_to(scene.mesh, scene.anatomy, model)) << "everything slides";
+  model.supports["clamp"].kind = InterfaceKind::fixed;
+  EXPECT_TRUE(compliance.belongs_to(scene.mesh, scene.anatomy, model));
+  const std::vector<double> before = stiffness_under(scene, model);
+  model.effects = {effect("support_compliance", {{"turn_deg_per_nm", 50}})};
+  const std::vector<double> all = stiffness_under(scene, model);
+  EXPECT_LT(all[0], 0.1 * before[0]);
+  EXPECT_EQ(all[1], before[1]);
+  model.effects[0].options["support"] = "clamp";
+  EXPECT_EQ(stiffness_under(scene, model), all);
+  model.effects[0].options["support"] = "table";
+  EXPECT_THROW(stiffness_under(scene, model), InputError);
+  model.supports["table"].kind = InterfaceKind::elastic;
+  EXPECT_LT(stiffness_under(scene, model)[1], before[1]);
 }
 
 TEST(SupportCompliance, AFixedSupportHoldsWithoutIt) {

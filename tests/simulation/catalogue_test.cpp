@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "common/error.h"
@@ -36,7 +37,8 @@ class CatalogueTest : public ::testing::TestWithParam<const Effect*> {
     testing::name_parts_and_support(scene.mesh);
   }
   Fields<Dual> with(const std::vector<Dual>& values, const std::string& pose = "supine") const {
-    const Scene place{scene.mesh, scene.anatomy, layout, pose};
+    Scene place{scene.mesh, scene.anatomy, layout, pose};
+    place.tied_supports.assign(scene.mesh.support_names.size(), true);
     Fields<Dual> fields = make_fields(model, place, {0.1, 0.9, 0.4});
     std::map<std::string, std::string> options;
     for (const OptionRow& row : GetParam()->options()) options[row.name] = row.default_value;
@@ -53,6 +55,19 @@ TEST_P(CatalogueTest, NullValuesLeaveEveryFieldBitForBit) {
   for (const Parameter& row : GetParam()->parameters()) null.emplace_back(row.null);
   for (const char* pose : {"prone", "supine"})
     EXPECT_EQ(all_numbers(values_of(with(null, pose))), all_numbers(values_of(with({}, pose))));
+}
+
+TEST_P(CatalogueTest, RangesHoldTheNullAndWhatIsUsual) {
+  for (const Parameter& row : GetParam()->parameters()) {
+    EXPECT_LT(row.lower, row.upper) << row.name;
+    EXPECT_GE(row.median, row.lower) << row.name;
+    EXPECT_LE(row.median, row.upper) << row.name;
+    EXPECT_GT(row.spread, 0) << row.name;
+    constexpr double e_squared = 2;  // of a number above zero it may be that of the logarithm
+    const bool of_logarithm = row.lower >= 0 && row.median > 0;
+    EXPECT_LE(row.spread, std::max(of_logarithm ? e_squared : 0, row.upper - row.lower))
+        << row.name << ": a prior wider than what can be";
+  }
 }
 
 TEST_P(CatalogueTest, ActsWhereAndOnWhatItsTraitsSay) {

@@ -152,13 +152,25 @@ TEST_F(WarpTool, RefusesWhatCannotBeRight) {
   expect_refused({"--points", (case_ / "out.csv").string()}, {"every point lies outside", "RAS"});
 }
 
-TEST_F(WarpTool, DoubtsAVolumeThatShowsAnotherBody) {
+TEST_F(WarpTool, TakesNoVolumeThatShowsAnotherBody) {
   const auto shifted = testing::volume_of(testing::grid_over({-25, -25, -25}, 90, 2.5),
                                           [](const auto& p) { return grey(p + Eigen::Vector3d(25, 25, 20)); });
   segmentation::write_image(shifted, case_ / "other.nrrd");
-  const Finished finished = run({(case_ / "other.nrrd").string(), "--no-transform"});
-  EXPECT_EQ(finished.code, 0);
-  EXPECT_NE(finished.err.find("does not show the skin"), std::string::npos) << finished.err;
+  const std::string other = (case_ / "other.nrrd").string();
+  expect_refused({other, "--no-transform"}, {"other.nrrd does not show the skin", "bound 65 %", "--trust-place"});
+  const Finished trusted = run({other, "--no-transform", "--trust-place"});
+  EXPECT_EQ(trusted.code, 0);
+  EXPECT_NE(trusted.err.find("does not show the skin"), std::string::npos) << trusted.err;
+}
+
+TEST_F(WarpTool, CarriesAPartOfTheBodyWhenToldTo) {
+  const auto part = testing::volume_of(testing::grid_over({0, 0, 0}, 20, 2.5), [](const auto& p) { return grey(p); });
+  segmentation::write_image(part, case_ / "ultrasound.nrrd");
+  const std::string ultrasound = (case_ / "ultrasound.nrrd").string();
+  expect_refused({ultrasound, "--no-transform"}, {"ultrasound.nrrd: holds", "bound 50 %", "--trust-place"});
+  const Finished trusted = run({ultrasound, "--no-transform", "--trust-place"});
+  EXPECT_EQ(trusted.code, 0) << trusted.err;
+  EXPECT_NE(trusted.err.find("the rest becomes background"), std::string::npos) << trusted.err;
 }
 
 }  // namespace

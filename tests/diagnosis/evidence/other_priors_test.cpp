@@ -37,7 +37,9 @@ struct Sheet {
     included = inclusions(hypotheses, effects, priors);
   }
 
-  std::vector<OtherPrior> others() const { return under_other_priors(base, hypotheses, effects, included, {}, priors); }
+  std::vector<OtherPrior> others() const {
+    return under_other_priors(base, hypotheses, effects, included, {}, priors, {});
+  }
 };
 
 /// The least misfit that names the effect.

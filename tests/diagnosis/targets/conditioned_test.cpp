@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <limits>
 #include <random>
 
 #include "common/statistics.h"
@@ -41,7 +43,7 @@ struct Made {
     moves.target_kernel = target_forces * target_forces.transpose();
     moves.target_errors = 0.1 * MatrixXd::Identity(6, 6);
     moves.y = drawn(7, 1, generator);
-    moves.sizes_mm = VectorXd::Constant(1, 0.7), moves.size_probability = VectorXd::Ones(1);
+    moves.sizes_mm = VectorXd::Constant(1, 0.7), moves.sets = {{{0, 1, 2, 3}, VectorXd::Ones(1)}};
   }
 };
 
@@ -89,7 +91,7 @@ TEST(ConditionedTargets, MixTheirSizes) {
   Made made(4);
   JointMoves one = made.moves, other = made.moves, both = made.moves;
   other.sizes_mm[0] = 2;
-  both.sizes_mm = Eigen::Vector2d(0.7, 2), both.size_probability = Eigen::Vector2d(0.25, 0.75);
+  both.sizes_mm = Eigen::Vector2d(0.7, 2), both.sets[0].size_probability = Eigen::Vector2d(0.25, 0.75);
   const ConditionedTargets a = condition(one), b = condition(other), mixed = condition(both);
   const VectorXd mean = 0.25 * a.mean + 0.75 * b.mean;
   MatrixXd covariance = MatrixXd::Zero(6, 6);
@@ -99,7 +101,125 @@ TEST(ConditionedTargets, MixTheirSizes) {
   EXPECT_LT((mixed.covariance - covariance).norm(), 1e-10);
 }
 
-TEST(SurpriseOfSomeDistances, HasTheDistributionItStates) {
+/// One direction more, that is there with some probability, and the evidence of both sets as its formula has it.
+struct Mixed : Made {
+  static constexpr double with_it = 0.3, size = 0.7;
+  MatrixXd covariance_of(const std::vector<int>& set) const {
+    const MatrixXd columns = moves.data(Eigen::all, set);
+    return moves.data_errors + size * size * moves.data_kernel +
+           columns * moves.sd(set).cwiseAbs2().asDiagonal() * columns.transpose();
+  }
+  double density(const std::vector<int>& set, const std::vector<int>& rows) const {
+    const MatrixXd covariance = covariance_of(set)(rows, rows);
+    const VectorXd off = (moves.y + moves.data(Eigen::all, set) * moves.mean(set))(rows);
+    return std::exp(-0.5 * off.dot(covariance.ldlt().solve(off))) / std::sqrt(covariance.determinant());
+  }
+  /// Sets weighed by what @p rows of the distances say.
+  void weigh(const std::vector<int>& rows) {
+    const double less = (1 - with_it) * density({0, 1, 2}, rows), all = with_it * density({0, 1, 2, 3}, rows);
+    moves.sets = {{{0, 1, 2}, VectorXd::Constant(1, less / (less + all))},
+                  {{0, 1, 2, 3}, VectorXd::Constant(1, all / (less + all))}};
+  }
+  explicit Mixed(unsigned seed) : Made(seed) { weigh({0, 1, 2, 3, 4, 5, 6}); }
+};
+
+TEST(ConditionedTargets, MixTheirSets) {
+  const Mixed made(7);
+  JointMoves less = made.moves, all = made.moves;
+  less.sets = {{{0, 1, 2}, VectorXd::Ones(1)}}, all.sets = {{{0, 1, 2, 3}, VectorXd::Ones(1)}};
+  const ConditionedTargets a = condition(less), b = condition(all), mixed = condition(made.moves);
+  const double p = made.moves.sets[1].size_probability[0];
+  const VectorXd mean = (1 - p) * a.mean + p * b.mean;
+  MatrixXd covariance = MatrixXd::Zero(6, 6), with = MatrixXd::Zero(6, 4);
+  for (const auto& [weight, part] : {std::pair(1 - p, &a), std::pair(p, &b)}) {
+    covariance += weight * (part->covariance + (part->mean - mean) * (part->mean - mean).transpose());
+    with += weight * (part->with_directions + (part->mean - mean) * part->directions_mean.transpose());
+  }
+  EXPECT_LT((mixed.mean - mean).norm(), 1e-12);
+  EXPECT_LT((mixed.covariance - covariance).norm(), 1e-10);
+  EXPECT_LT((mixed.with_directions - with).norm(), 1e-10);
+  EXPECT_EQ(a.directions_covariance(3, 3), 0) << "what is not there is known";
+}
+
+TEST(ConditionedTargets, HoldTheTruthAsOftenAsTheySay) {
+  Mixed made(8);
+  made.moves.targets.col(3) *= 6;  // what may be there moves the places far
+  std::mt19937 generator(13);
+  MatrixXd all(7, 12), places(6, 12);
+  all << made.moves.data, made.moves.data_patches, Mixed::size * made.data_forces;
+  places << made.moves.targets, made.moves.target_patches, Mixed::size * made.target_forces;
+  constexpr int draws = 1000;
+  int inside = 0, inside_if_nothing = 0;
+  std::bernoulli_distribution there(Mixed::with_it);
+  const auto holds = [](const ConditionedTargets& known, const VectorXd& t, double reach) {
+    const Eigen::Vector3d off = t.head(3) - known.mean.head(3);
+    return off.dot(known.covariance.topLeftCorner<3, 3>().ldlt().solve(off)) <= reach;
+  };
+  for (int d = 0; d < draws; ++d) {
+    VectorXd unknowns = drawn(12, 1, generator);
+    unknowns.head(4) = made.moves.mean + made.moves.sd.cwiseProduct(unknowns.head(4));
+    if (!there(generator)) unknowns[3] = 0;
+    made.moves.y = -(all * unknowns + std::sqrt(0.2) * drawn(7, 1, generator));
+    const VectorXd t = places * unknowns + std::sqrt(0.1) * drawn(6, 1, generator);
+    made.weigh({0, 1, 2, 3, 4, 5, 6});
+    const ConditionedTargets known = condition(made.moves);
+    inside += holds(known, t, known.reach95[0]);
+    JointMoves nothing = made.moves;
+    nothing.sets = {{{0, 1, 2}, VectorXd::Ones(1)}};
+    inside_if_nothing += holds(condition(nothing), t, chi_squared_quantile(3, 0.95));
+  }
+  EXPECT_NEAR(inside, 0.95 * draws, 3 * std::sqrt(0.95 * 0.05 * draws) + 5);
+  EXPECT_LT(inside_if_nothing, 0.88 * draws);
+}
+
+TEST(ConditionedTargets, CutWhatHasNoValuesBelow) {
+  Made made(9);
+  JointMoves& m = made.moves;
+  m.least = VectorXd::Constant(4, -std::numeric_limits<double>::infinity());
+  const ConditionedTargets whole = condition(m);
+  // Half a standard deviation above where it is: most of it is cut.
+  const double sd = std::sqrt(whole.directions_covariance(2, 2)), least = whole.directions_mean[2] + 0.5 * sd;
+  m.least[2] = least;
+  const ConditionedTargets cut = condition(m);
+  std::mt19937 generator(14);
+  std::normal_distribution<double> normal;
+  const VectorXd gain = whole.with_directions.col(2) / (sd * sd);
+  VectorXd mean = VectorXd::Zero(6);
+  double number = 0;
+  constexpr int draws = 20000;
+  for (int kept = 0; kept < draws;) {
+    const double z = whole.directions_mean[2] + sd * normal(generator);
+    if (z < least) continue;
+    ++kept;
+    number += z / draws, mean += (whole.mean + gain * (z - whole.directions_mean[2])) / draws;
+  }
+  EXPECT_NEAR(cut.directions_mean[2], number, 0.02 * sd);
+  EXPECT_LT((cut.mean - mean).norm(), 0.02 * sd * gain.norm());
+  EXPECT_LT(cut.directions_covariance(2, 2), 0.3 * sd * sd);
+  EXPECT_LT(cut.covariance.trace(), whole.covariance.trace());
+}
+
+TEST(DistancesExpectedByOthers, CountSetsAsTheOthersHaveThem) {
+  Mixed made(10);
+  const std::vector<int> rows = {1, 4, 5}, others = {0, 2, 3, 6};
+  const Expected found = expected_by_others(made.moves, rows);
+  const auto of_set = [&](const std::vector<int>& set) {
+    const MatrixXd all = made.covariance_of(set), gain = all(rows, others) * all(others, others).inverse();
+    const VectorXd off = made.moves.y + made.moves.data(Eigen::all, set) * made.moves.mean(set);
+    return std::pair<VectorXd, MatrixXd>(off(rows) - gain * off(others), all(rows, rows) - gain * all(others, rows));
+  };
+  made.weigh(others);
+  const double p = made.moves.sets[1].size_probability[0];
+  const auto [less_mean, less] = of_set({0, 1, 2});
+  const auto [all_mean, all] = of_set({0, 1, 2, 3});
+  const VectorXd mean = (1 - p) * less_mean + p * all_mean;
+  const MatrixXd second =
+      (1 - p) * (less + less_mean * less_mean.transpose()) + p * (all + all_mean * all_mean.transpose());
+  EXPECT_LT((found.less_expected - mean).norm(), 1e-9);
+  EXPECT_LT((found.covariance - (second - mean * mean.transpose())).norm(), 1e-9);
+}
+
+TEST(DistancesExpectedByOthers, HaveTheDistributionTheyState) {
   Made made(5);
   std::mt19937 generator(11);
   const JointMoves& m = made.moves;
@@ -113,9 +233,10 @@ TEST(SurpriseOfSomeDistances, HasTheDistributionItStates) {
     VectorXd unknowns = drawn(12, 1, generator);
     unknowns.head(4) = m.mean + m.sd.cwiseProduct(unknowns.head(4));
     made.moves.y = -(all * unknowns + std::sqrt(0.2) * drawn(7, 1, generator));
-    const Surprise surprise = surprise_of(made.moves, rows);
-    beyond += surprise.p_value < 0.05;
-    square += surprise.square / draws;
+    const Expected expected = expected_by_others(made.moves, rows);
+    const double found = expected.less_expected.dot(expected.covariance.ldlt().solve(expected.less_expected));
+    beyond += chi_squared_above(3, found) < 0.05;
+    square += found / draws;
   }
   EXPECT_NEAR(beyond, 0.05 * draws, 3 * std::sqrt(0.05 * 0.95 * draws));
   EXPECT_NEAR(square, 3, 3 * std::sqrt(6.0 / draws));

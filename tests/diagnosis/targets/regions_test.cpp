@@ -12,6 +12,8 @@
 #include "diagnosis/targets/moves.h"
 #include "diagnosis/targets/places.h"
 #include "diagnosis/weighted_fit.h"
+#include "simulation/catalogue.h"
+#include "simulation/parameters.h"
 #include "tests/calibration/twin.h"
 
 namespace supine::diagnosis {
@@ -28,13 +30,15 @@ Points inside(const meshing::TetMesh& mesh) {
 }
 
 struct Asked {
-  Twin twin{{supine::testing::twin_truth(), 0.3}};
+  explicit Asked(const simulation::Model& truth = supine::testing::twin_truth()) : twin({truth, 0.3}) {}
+  Twin twin;
   TargetQuestion question{&twin.mesh, &twin.anatomy, twin.prone, twin.supine, {"a", "b", "c", "d"}, inside(twin.mesh)};
   Points truth() const { return simulation::Embedding(twin.mesh, question.imaged).at(twin.solution.poses[0].x); }
 };
 
 /// A fit of the twin's scan, without other meshes: the truth lies on this one.
 struct Fitted : Asked {
+  using Asked::Asked;
   simulation::Model start = supine::testing::twin_start();
   calibration::Evaluator evaluator{twin.scene(), start, accurate_enough()};
   Priors priors;
@@ -49,7 +53,10 @@ struct Fitted : Asked {
 TEST(PointMoves, AreThoseOfTheModelSolvedAgain) {
   const Asked asked;
   const simulation::Model model = supine::testing::twin_truth();
-  const auto& [mesh, anatomy, prone, pose, names, imaged, further] = asked.question;
+  const auto* mesh = asked.question.mesh;
+  const auto* anatomy = asked.question.anatomy;
+  const auto &prone = asked.question.prone, &pose = asked.question.pose;
+  const Points& imaged = asked.question.imaged;
   const PointMoves moves = [&] {
     PoseAt at(*mesh, *anatomy, prone, pose, model, nullptr);
     const calibration::FreeParameters free(model);
@@ -111,8 +118,8 @@ TEST(PlacesOfTargets, NearestSkinAndTheSkinAboveAreOnTheSkin) {
 TEST(TargetRegionsOfATwin, HoldTheTruthAndAreTighterThanWithoutTheScan) {
   Fitted fitted;
   fitted.question.further_scans = true;
-  const TargetRegions known = find_regions(fitted.question, fitted.evaluator, fitted.base, fitted.priors);
-  const TargetRegions guessed = find_regions(fitted.question, fitted.start, fitted.priors);
+  const TargetRegions known = find_regions(fitted.question, fitted.evaluator, fitted.base, {}, fitted.priors);
+  const TargetRegions guessed = find_regions(fitted.question, fitted.start, false, fitted.priors);
   EXPECT_TRUE(known.measured);
   EXPECT_FALSE(guessed.measured);
   const Points truth = fitted.truth();
@@ -122,8 +129,8 @@ TEST(TargetRegionsOfATwin, HoldTheTruthAndAreTighterThanWithoutTheScan) {
     EXPECT_LT(off.dot(region.covariance.ldlt().solve(off)), chi_squared_quantile(3, 0.999)) << region.name;
     EXPECT_LT(region.sd_mm(), 0.8 * guessed.points[p].sd_mm()) << region.name;
     EXPECT_GT(region.half_axes_mm[2], 0);
-    EXPECT_NEAR(std::pow(region.half_axes_mm.norm(), 2), chi_squared_quantile(3, 0.95) * region.covariance.trace(),
-                1e-9);
+    // Over sizes of the unexplained the tails are longer than a normal's, but not by much.
+    EXPECT_NEAR(std::pow(region.half_axes_mm.norm(), 2) / region.covariance.trace(), chi_squared_quantile(3, 0.95), 1);
     ASSERT_TRUE(region.nearest);
     EXPECT_GT(region.nearest->sd_mm, 0);
     EXPECT_LT(region.nearest->sd_mm, region.half_axes_mm[0]);
@@ -143,9 +150,97 @@ TEST(TargetRegionsOfATwin, HoldTheTruthAndAreTighterThanWithoutTheScan) {
   EXPECT_TRUE(std::any_of(known.points.begin(), known.points.end(), scan));
 }
 
+/// Whether an ellipsoid holds a point.
+bool holds(const TargetRegion& region, const Eigen::Vector3d& point) {
+  return (region.axes.transpose() * (point - region.place_mm)).cwiseQuotient(region.half_axes_mm).norm() <= 1;
+}
+
+TEST(TargetRegionsOfATwin, HoldTheTruthThatTheModelLacks) {
+  simulation::Model truth = supine::testing::twin_truth();
+  truth.effects.push_back(simulation::null_setting(*simulation::find_effect("gravity_tilt")));
+  truth.effects.back().parameters.at("pitch_rad").value = 0.25;
+  Fitted fitted(truth);
+  const MissingEffects missing = screen_effects(fitted.evaluator, fitted.base, fitted.priors);
+  const TargetRegions over_all = find_regions(fitted.question, fitted.evaluator, fitted.base, missing, fitted.priors);
+  const TargetRegions if_nothing = find_regions(fitted.question, fitted.evaluator, fitted.base, {}, fitted.priors);
+  EXPECT_TRUE(if_nothing.sets.empty());
+  ASSERT_FALSE(over_all.sets.empty());
+  const Points places = fitted.truth();
+  double variance = 0, variance_if_nothing = 0;
+  for (int p = 0; p < 4; ++p) {
+    const TargetRegion &all = over_all.points[static_cast<std::size_t>(p)],
+                       &nothing = if_nothing.points[static_cast<std::size_t>(p)];
+    EXPECT_TRUE(holds(all, places.row(p).transpose())) << p;
+    variance += all.covariance.trace(), variance_if_nothing += nothing.covariance.trace();
+    EXPECT_LT((all.if_nothing_missing.place_mm - nothing.place_mm).norm(), 1e-6);
+  }
+  EXPECT_GT(variance, variance_if_nothing);
+  // What a diagnosis knows better: it was the tilt.
+  MissingEffects known = missing;
+  EXPECT_TRUE(weigh_as({{{"gravity_tilt"}, 0.97}, {{}, 0.01}}, fitted.start, known).empty());
+  EXPECT_NEAR(known.likeliest(1)[0].probability, 0.97, 1e-12);
+  double sum = 0;
+  for (const Hypothesis& h : known.hypotheses) sum += h.probability;
+  EXPECT_NEAR(sum, 1, 1e-9);
+  const TargetRegions diagnosed = find_regions(fitted.question, fitted.evaluator, fitted.base, known, fitted.priors);
+  for (int p = 0; p < 4; ++p)
+    EXPECT_TRUE(holds(diagnosed.points[static_cast<std::size_t>(p)], places.row(p).transpose())) << p;
+  EXPECT_EQ(weigh_as({{{"left_right_stiffness"}, 0.5}}, fitted.start, known),
+            (std::vector<std::string>{"left_right_stiffness"}));
+}
+
+TEST(EffectMoves, AreThoseOfTheModelWithTheEffect) {
+  const Asked asked;
+  const simulation::Model model = supine::testing::twin_truth();
+  const auto* mesh = asked.question.mesh;
+  const auto* anatomy = asked.question.anatomy;
+  PoseAt at(*mesh, *anatomy, asked.question.prone, asked.question.pose, model, nullptr);
+  const simulation::Embedding points(*mesh, asked.question.imaged);
+  std::vector<Candidate> candidates;
+  for (Candidate& candidate : lacking_effects(model, *mesh, *anatomy))
+    if (candidate.effect == "ligament" || candidate.effect == "gravity_tilt")
+      candidates.push_back(std::move(candidate));
+  ASSERT_EQ(candidates.size(), 2u);
+  candidates[0].secant_to = 0.2;  // kPa/mm
+  const Eigen::MatrixXd found = effect_moves(*mesh, *anatomy, at, points, candidates);
+  const auto moved = [&](const std::string& name, double by) -> Eigen::VectorXd {
+    simulation::Model with = model;
+    const simulation::Effect& effect = *simulation::find_effect(name.substr(0, name.find('.')));
+    with.effects.push_back(simulation::null_setting(effect));
+    simulation::find_setting(with, name)->value += by;
+    simulation::Chain chain(*mesh, *anatomy, with, {asked.question.prone, asked.question.pose}, accurate_enough());
+    const Points off = points.at(chain.solve(with, &at.solution).poses[0].x) - points.at(at.x());
+    return Eigen::Map<const Eigen::VectorXd>(off.data(), off.size()) / by;
+  };
+  ASSERT_EQ(found.cols(), 1 + static_cast<Eigen::Index>(candidates[1].parameters.size()));
+  EXPECT_LT((found.col(0) - moved("ligament.stiffness_kpa_per_mm", 0.2)).norm(), 1e-3 * found.col(0).norm());
+  for (std::size_t k = 0; k < candidates[1].parameters.size(); ++k) {
+    const Eigen::VectorXd slope = moved(candidates[1].parameters[k].name, 1e-3);
+    EXPECT_GT(slope.norm(), 1);
+    EXPECT_LT((found.col(1 + static_cast<Eigen::Index>(k)) - slope).norm(), 1e-2 * slope.norm());
+  }
+}
+
+TEST(TargetRegionsOfATwin, WithoutAScanAreWiderWhereTheModelMayLackSomething) {
+  const Asked asked;
+  const simulation::Model start = supine::testing::twin_start();
+  const TargetRegions nothing = find_regions(asked.question, start, false, {});
+  const TargetRegions anything = find_regions(asked.question, start, true, {});
+  ASSERT_FALSE(anything.sets.empty());
+  EXPECT_TRUE(anything.sets.front().effects.empty());
+  EXPECT_NEAR(anything.sets.front().probability, 0.5 / 0.95, 1e-9);
+  double sum = 0, sum_if_nothing = 0;
+  for (std::size_t p = 0; p < 4; ++p) {
+    sum += anything.points[p].sd_mm(), sum_if_nothing += nothing.points[p].sd_mm();
+    EXPECT_NEAR(anything.points[p].if_nothing_missing.half_axes_mm[0], nothing.points[p].half_axes_mm[0],
+                0.02 * nothing.points[p].half_axes_mm[0]);
+  }
+  EXPECT_GT(sum, sum_if_nothing);
+}
+
 TEST(TargetRegionsOfATwin, AreWhatDrawsThroughTheChainSpread) {
   Fitted fitted;
-  const TargetRegions known = find_regions(fitted.question, fitted.evaluator, fitted.base, fitted.priors);
+  const TargetRegions known = find_regions(fitted.question, fitted.evaluator, fitted.base, {}, fitted.priors);
   const DrawnPlaces drawn =
       draw_places(fitted.question, *fitted.base.parameters, known, &fitted.base.fit.prediction.solution, 60, 1);
   EXPECT_EQ(drawn.draws, 60);
@@ -154,7 +249,7 @@ TEST(TargetRegionsOfATwin, AreWhatDrawsThroughTheChainSpread) {
     EXPECT_GT(drawn.linear_sd_mm[p], 0.05);
     EXPECT_NEAR(drawn.drawn_sd_mm[p] / drawn.linear_sd_mm[p], 1, 0.3) << p;
     EXPECT_LT(drawn.mean_off_mm[p], drawn.linear_sd_mm[p]);
-    EXPECT_GT(drawn.inside[p], 0.8);
+    EXPECT_GE(drawn.inside[p], 0.75);
   }
 }
 
@@ -174,13 +269,18 @@ TEST(TargetRegionsOfATwin, LandmarksThatLieElsewhereAreTold) {
     BaseFitOptions options;
     options.other_meshes = false;
     const BaseFit base = fit_base_model(evaluator, start, start, {0.3}, nullptr, options);
-    return *find_regions(asked.question, evaluator, base, {}).landmarks;
+    return *find_regions(asked.question, evaluator, base, {}, {}).landmarks;
   };
   const ExpectedLandmarks right = told();
-  EXPECT_GT(right.p_value, 0.05);
-  EXPECT_LT((right.expected - marks.measured).norm(), 3 * std::sqrt(right.covariance.trace()));
+  EXPECT_GT(right.agreement.p_value, 0.05);
+  EXPECT_LT((right.expected.places - marks.measured).norm(), 3 * std::sqrt(right.expected.covariance.trace()));
+  const Points kept = marks.measured;
   marks.measured.row(0) += Eigen::RowVector3d(9, 0, -9);
-  EXPECT_LT(told().p_value, 0.01);
+  EXPECT_LT(told().agreement.p_value, 0.01);
+  // A wrong scale: all of them spread, which a large unexplained field would swallow if they were asked of its size.
+  const Eigen::RowVector3d middle = kept.colwise().mean();
+  marks.measured = (1.3 * (kept.rowwise() - middle)).rowwise() + middle;
+  EXPECT_LT(told().agreement.p_value, 0.01);
 }
 
 }  // namespace

@@ -176,9 +176,20 @@ TEST(MuscleDistance, SheetMayBeCoarse) {
   EXPECT_NEAR(fit(mesh).value({5, -12, 7}), 12, 1e-6);
 }
 
-TEST(MuscleDistance, RefusesASheetOfTooFewTriangles) {
-  meshing::TetMesh mesh = testing::dome_mesh({.rings = 2, .layers = 1, .muscle_rings = 1});
-  EXPECT_THROW(fit(mesh), InputError);
+TEST(MuscleDistance, OfAFlatFaceOfTwoTrianglesAsCadHasItIsThatToItsPlane) {
+  reconstruction::Surface face;
+  face.points.resize(4, 3);
+  face.points << -30, 0, -20, 30, 0, -20, -30, 0, 20, 30, 0, 20;
+  face.triangles.resize(2, 3);
+  face.triangles << 0, 2, 1, 1, 2, 3;  // outward +y
+  Eigen::Matrix<double, 2, 3> reach;
+  reach << -30, 0, -20, 30, 25, 20;
+  const meshing::MuscleDistance distance(face, reach);
+  for (const Eigen::Vector3d& at : {Eigen::Vector3d(0, 12, 0), {28, 5, -18}, {-29, 20, 19}}) {
+    const auto sample = distance.at(at);
+    EXPECT_NEAR(sample.value_mm, at.y(), 1e-6);
+    EXPECT_LT((sample.gradient - Eigen::Vector3d::UnitY()).norm(), 1e-6);
+  }
 }
 
 TEST(MuscleDistance, RefusesASheetOfNoArea) {

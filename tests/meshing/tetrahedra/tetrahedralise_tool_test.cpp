@@ -75,12 +75,13 @@ TEST_F(TetrahedraliseTool, WritesAMeshWithRingAndFigures) {
 }
 
 TEST_F(TetrahedraliseTool, OptionsWork) {
-  ASSERT_EQ(run("coarse.vtp muscle.vtp labels.vti --order 2 --cells 8000 --side left -o fine.vtu"), 0)
+  ASSERT_EQ(run("coarse.vtp muscle.vtp labels.vti --order 2 --cells 8000 --side right -o fine.vtu"), 0)
       << text("err.txt");
   const auto mesh = meshing::read_mesh(folder_ / "fine.vtu");
   EXPECT_EQ(mesh.order(), 2);
   EXPECT_NEAR(static_cast<double>(mesh.cells.rows()), 8000, 2000);
-  EXPECT_EQ(meshing::read_side(folder_ / "fine.vtu"), "left");
+  EXPECT_EQ(meshing::read_side(folder_ / "fine.vtu"), "right");
+  EXPECT_EQ(run("coarse.vtp muscle.vtp labels.vti --side left -o other.vtu"), 2) << "the labels say right";
 }
 
 TEST_F(TetrahedraliseTool, CheckReportsAndWritesNothing) {

@@ -139,10 +139,15 @@ TEST_F(ModelFile, ContactIsOffUnlessItIsAskedFor) {
   EXPECT_EQ(said.kind, simulation::ContactKind::skin);
   EXPECT_EQ(said.stiffness_kpa_per_mm, 3.5);
   EXPECT_EQ(said.band_mm, 0.7);
-  EXPECT_THROW(read(good + "[contact]\nkind = \"chest\"\n"), InputError);
+  EXPECT_EQ(read(good + "[contact]\nkind = \"chest\"\n").contact.kind, simulation::ContactKind::chest);
+  EXPECT_TRUE(read(good + "[contact]\nkind = \"all\"\n").contact.with_chest());
+  EXPECT_TRUE(read(good + "[contact]\nkind = \"all\"\n").contact.with_skin());
+  EXPECT_THROW(read(good + "[contact]\nkind = \"ribs\"\n"), InputError);
   EXPECT_THROW(read(good + "[contact]\nkind = \"skin\"\nband_mm = 0\n"), InputError);
   EXPECT_THROW(read(good + "[contact]\nkind = \"skin\"\nstiffness_kpa_per_mm = -1\n"), InputError);
   EXPECT_THROW(read(good + "[contact]\nkinds = \"skin\"\n"), InputError);
+  EXPECT_THROW(read(good + "[contact]\nstiffness_kpa_per_mm = 3.5\n"), InputError);
+  EXPECT_NO_THROW(read(good + "[contact]\nkind = \"off\"\nstiffness_kpa_per_mm = 3.5\n"));
 }
 
 TEST_F(ModelFile, TheSamplesAreRead) {

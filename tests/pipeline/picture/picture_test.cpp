@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "common/error.h"
+#include "reconstruction/surface_io.h"
 #include "tests/pipeline/process.h"
 #include "tests/pipeline/small_run.h"
 #include "tests/pipeline/temporary_folder.h"
@@ -83,6 +86,29 @@ TEST_F(Pictures, TheOuterSideIsThatOfTheBreastAndOfBothBreasts) {
   EXPECT_NE(drawn[0], drawn[1]);
   EXPECT_NE(drawn[0], drawn[2]);
   EXPECT_NE(drawn[1], drawn[2]);
+}
+
+TEST_F(Pictures, APlacementShowsTheScanAsGivenAndAsFound) {
+  NEEDS_XVFB();
+  const reconstruction::Surface body = reconstruction::read_surface(small_run() / "out/comparison.vtp", "LPS");
+  reconstruction::Surface contour = body, moved = body;
+  contour.triangles.resize(0, 3);
+  moved.points.col(0).array() += 20;
+  const std::pair<std::string, Placed> sheets[] = {{"same", {body, body, body}},
+                                                   {"moved", {body, moved, body}},
+                                                   {"contour", {body, contour, body}},
+                                                   {"object", {body, moved, body, true}}};
+  std::set<std::string> drawn;
+  for (const auto& [name, placed] : sheets) {
+    draw_placement(placed, "the same title", folder_ / (name + ".png"));
+    expect_picture(name + ".png");
+    drawn.insert(read_text(folder_ / (name + ".png")));
+  }
+  EXPECT_EQ(drawn.size(), std::size(sheets));
+  reconstruction::Surface none = body;
+  none.triangles.resize(0, 3);
+  EXPECT_THROW(draw_placement({none, body, body}, "none", folder_ / "none.png"), InputError);
+  EXPECT_FALSE(fs::exists(folder_ / "none.png"));
 }
 
 TEST_F(Pictures, TetrahedraliseDrawsItsRegions) {

@@ -153,7 +153,7 @@ TEST(ReportThinning, TakesEveryNthOfBarePoints) {
 TEST(ReportPolydata, SaysWhatIsWrongWithAFile) {
   const TemporaryFolder folder;
   write_text(folder / "a.vtp", "this is no XML");
-  expect_words(input_error([&] { read_polydata(folder / "a.vtp"); }), {"a.vtp", "not a VTK polydata file"});
+  expect_words(input_error([&] { read_polydata(folder / "a.vtp"); }), {"a.vtp", "not a readable .vtp file"});
   expect_words(input_error([&] { read_polydata(folder / "b.vtp"); }), {"b.vtp", "no such file"});
 }
 

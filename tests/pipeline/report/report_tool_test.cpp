@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "meshing/mesh_io.h"
 #include "pipeline/report/page.h"
 #include "tests/pipeline/small_run.h"
 #include "tests/pipeline/temporary_folder.h"
@@ -91,8 +92,11 @@ TEST_F(ReportTool, DoesNotReplaceAPageWithoutForce) {
 }
 
 TEST_F(ReportTool, AComparisonOfAnotherPredictionIsLeftOutWithAWarning) {
-  fs::remove(out() / "supine.vtu");
-  fs::copy_file(out() / "undeformed.vtu", out() / "supine.vtu");
+  const meshing::PoseMesh was = meshing::read_pose(out() / "supine.vtu");
+  Points moved = was.positions;
+  moved.col(2).array() += 1;
+  meshing::write_pose(was.mesh, moved, {}, {}, out() / "supine.vtu", meshing::read_side(out() / "supine.vtu"),
+                      "supine");
   const Finished finished = report();
   ASSERT_EQ(finished.code, 0) << finished.err;
   expect_words(finished.err, {"comparison.vtp", "compare again"});

@@ -219,6 +219,9 @@ TEST_F(ToolMain, ChecksOfNumbersSayWhatIsWanted) {
   EXPECT_EQ(said(not_below_zero(), "0"), "");
   EXPECT_EQ(said(not_below_zero(), "-1"), "-1 is no number from 0 up");
   EXPECT_EQ(said(not_below_zero(), "1,5"), "1,5 is no number from 0 up");
+  EXPECT_EQ(said(within(0, 10), "10"), "");
+  EXPECT_EQ(said(within(0, 10), "10.5"), "10.5 is no number in 0 to 10");
+  EXPECT_EQ(said(within(0, 10), "nan"), "nan is no number in 0 to 10");
 }
 
 TEST(RunOfATool, GivesItsListenerEveryLineAndPrintsNone) {

@@ -72,6 +72,23 @@ TEST_P(BulkLawTest, TangentIsTheDerivativeOfTheStress) {
   }
 }
 
+TEST_P(BulkLawTest, TheNegativePartOfTheTangentIsTakenOffAndNoMore) {
+  if (!has_energy) return;
+  Matrix3 p;
+  Tangent9 tangent;
+  bulk_tangent(law, stretched() * Eigen::Vector3d(1, 1, 0.3).asDiagonal(), material, rest, p, tangent);
+  const Eigen::SelfAdjointEigenSolver<Tangent9> eigen(tangent);
+  ASSERT_LT(eigen.eigenvalues()[0], -1e-3 * tangent.norm()) << "nothing to take off";
+  const double volume = 2;
+  ElementSums<3> added;
+  added.clear(Demand{.tangent = true});
+  take_off_negative_curvature<3>(tangent, unit_gradients, volume, added);
+  const Tangent9 convex = tangent + point_tangent(added, true) / volume;
+  const Tangent9 expected =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() * eigen.eigenvectors().transpose();
+  EXPECT_LT((convex - expected).norm(), 1e-12 * tangent.norm());
+}
+
 TEST_P(BulkLawTest, StressTurnsWithTheBody) {
   const Matrix3 f = stretched(3);
   const Matrix3 turn = Eigen::AngleAxisd(2.0, Eigen::Vector3d(0.3, 1, 2).normalized()).toRotationMatrix();

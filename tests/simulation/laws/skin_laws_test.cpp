@@ -44,7 +44,7 @@ TEST_P(SkinLawTest, RelaxedEnergyAndStressAreContinuousAcrossTheBorders) {
   for (const auto& [l1, l2] : std::vector<std::pair<double, double>>{{1.3, natural}, {1.0, 0.8}}) {
     const bool along_first = l1 == 1.0;
     for (const double stiffening : {0.0, 2.5}) {
-      const auto at = [&](double d) {
+      const auto at = [&, l1 = l1, l2 = l2](double d) {
         return skin_energy<double>(s, material(0, stiffening),
                                    along_first ? of_stretches(l1 + d, l2) : of_stretches(l1, l2 + d));
       };

@@ -75,6 +75,8 @@ TEST_P(ContactTest, WithoutContactSkinPassesThroughSkinAndIsTold) {
   EXPECT_NE(warning.find("4.0 mm deep"), std::string::npos) << warning;
   EXPECT_NE(warning.find("[contact]"), std::string::npos) << warning;
   EXPECT_EQ(overlap_warning("supine", {.samples = 1, .deepest_mm = 0.9}, stack.model.contact), "");
+  EXPECT_EQ(warning.find("folded"), std::string::npos) << warning;
+  EXPECT_NE(overlap_warning("supine", overlap, stack.model.contact, 3).find("3 cells are folded"), std::string::npos);
 }
 
 // Through both solves and the contact between: a parameter moves the shapes as their differences say.
@@ -87,7 +89,7 @@ TEST_P(ContactTest, SensitivitiesPassThroughTheContact) {
        {std::pair{"breast.young_modulus_kpa", 0.02}, std::pair{"breast.density_kg_m3", 5.0}}) {
     const Points slope = sensitivities.of(name).poses[0];
     ASSERT_GT(slope.norm(), 0) << name;
-    const auto moved = [&](double h) -> Points {
+    const auto moved = [&, name = name](double h) -> Points {
       Model model = stack.model;
       (std::string(name) == "breast.density_kg_m3" ? model.breast.density_kg_m3 : model.breast.young_modulus_kpa)
           .value += h;

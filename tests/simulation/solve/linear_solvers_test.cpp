@@ -100,13 +100,19 @@ TEST_F(LinearSolversTest, ConjugateGradientsStopOnADescentWhereTheMatrixIsNotDef
     out = sums->tangent * in - 1.5 * curvature * v.dot(in) * v;
   };
   Krylov krylov(b.size());
-  Eigen::VectorXd x, product(b.size());
-  const auto report = krylov.conjugate_gradients(bent, inverse, b, {.tolerance = 1e-9, .max_iterations = 500}, x);
+  Eigen::VectorXd x, way, product(b.size());
+  const auto report = krylov.conjugate_gradients(bent, inverse, b, {.tolerance = 1e-9, .max_iterations = 500}, x, &way);
   ASSERT_TRUE(report.negative_curvature);
   ASSERT_GT(report.iterations, 0);
-  bent(x, product);
+  const auto quadratic = [&](const Eigen::VectorXd& at) {
+    bent(at, product);
+    return 0.5 * at.dot(product) - b.dot(at);
+  };
   EXPECT_GT(b.dot(x), 0);
-  EXPECT_LT(0.5 * x.dot(product) - b.dot(x), 0);
+  EXPECT_LT(quadratic(x), 0);
+  EXPECT_GT(b.dot(way), 0);
+  EXPECT_LT(quadratic(x + way), quadratic(x));
+  EXPECT_LT(quadratic(x + 100 * way), quadratic(x + way)) << "it goes on falling";
 }
 
 TEST_F(LinearSolversTest, ConjugateGradientsGiveUpWhereTheyAreTooSlow) {

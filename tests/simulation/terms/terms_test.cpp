@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/SparseCore>
 
 #include "simulation/mechanics.h"
 #include "simulation/model_fields.h"
+#include "simulation/terms/bulk.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"
 
@@ -126,12 +128,42 @@ TEST_P(TermsTest, ReferenceTangentIsTheDerivativeWithRespectToTheUndeformedShape
   EXPECT_GT(taylor_order([&](double h) { return residual(x, X + h * v); }, slope), 1.9);
 }
 
+template <class Element>
+Eigen::MatrixXd tissue_tangent(const Indices& cells, const Model& model, const Fields<Dual>& fields, const State& state,
+                               bool convex) {
+  const Pattern pattern(cells, state.X.rows());
+  BulkTerm<Element> tissue(cells, pattern, {.law = model.breast.law});
+  tissue.set_fields(values_of(fields));
+  Sums sums(pattern);
+  tissue.add(state, Demand{.residual = true, .tangent = true, .convex = convex}, sums);
+  return sums.tangent;
+}
+
+TEST_P(TermsTest, TheConvexTangentOfSqueezedTissueIsNoSofterThanTheExactOneAndNowhereNegative) {
+  without_friction();
+  if (!mechanics->has_energy()) return;
+  x.col(2) *= 0.3;
+  const auto tangent = [&](bool convex) {
+    const Indices& cells = scene.mesh.cells;
+    return GetParam().order == 2 ? tissue_tangent<Tet10>(cells, model, fields, {x, X}, convex)
+                                 : tissue_tangent<Tet4>(cells, model, fields, {x, X}, convex);
+  };
+  const Eigen::MatrixXd exact = tangent(false), convex = tangent(true);
+  const auto least = [](const Eigen::MatrixXd& m) {
+    return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(m, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  };
+  const double rounding = 1e-10 * convex.norm();
+  ASSERT_LT(least(exact), -1e3 * rounding) << "nothing to take off";
+  EXPECT_GT(least(convex), -rounding);
+  EXPECT_GT(least(convex - exact), -rounding);
+}
+
 TEST_P(TermsTest, EveryFieldHasItsDerivative) {
   // Each field alone moves along a random direction with a curvature, so that the remainder is of second order.
   for (const auto& [name, member] : field_columns<Dual>) {
     if (!reads(name)) continue;
     const Eigen::VectorXd direction = random_matrix(static_cast<int>((fields.*member).size()), 1, 11);
-    const auto moved = [&](const Dual& h) {
+    const auto moved = [&, member = member](const Dual& h) {
       Fields<Dual> f = fields;
       for (Eigen::Index i = 0; i < direction.size(); ++i) (f.*member)[i] *= 1.0 + 0.1 * direction[i] * h + 0.02 * h * h;
       return f;

@@ -37,9 +37,13 @@ const supine = (window.supine = {});
     const text = sign && typeof value === "number" ? signed(value, digits) : number(value, digits);
     return el("span", { class: "figure", "data-file": file, "data-path": JSON.stringify(path), "data-digits": digits }, text);
   };
+  // A body that is no breast has no side; what is said of a breast's anatomy is then said of a body.
+  const is_object = data.case.side === "none";
+  const of_body = (breast, object) => (is_object ? object : breast);
   const words = (name) => String(name).replace(/_/g, " ");
   // Of a parameter, without the unit that stands beside it: breast.young_modulus_kpa → breast young modulus.
-  const parameter = (name) => words(String(name).replace(/_(kpa_per_mm|kpa|mm|rad|kg_m3)$/, "").replace(".", " "));
+  const parameter = (name) =>
+    words(String(name).replace(/_(kpa_per_mm|kpa|mm|rad|kg_m3)$/, "").replace(/^breast\./, of_body("breast ", "body ")).replace(".", " "));
 
   const command = (text) => {
     const copy = el("button", { type: "button", onclick: () => navigator.clipboard && navigator.clipboard.writeText(text).then(
@@ -58,5 +62,5 @@ const supine = (window.supine = {});
     el("section", { id, "aria-labelledby": id + "-title" }, el("h2", { id: id + "-title" }, title), ...content);
   const first_file = (...names) => names.find((name) => data.figures[name]) || null;
 
-  Object.assign(supine, { data, fill, el, at, number, signed, sensible, p_value, shown, words, parameter, command, stage, gap, section, first_file });
+  Object.assign(supine, { data, fill, el, at, number, signed, sensible, p_value, shown, is_object, of_body, words, parameter, command, stage, gap, section, first_file });
 })();

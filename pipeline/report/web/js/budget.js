@@ -4,7 +4,8 @@
 (() => {
   const { data, gap, section } = supine;
   const parts = [["noise", "scan noise", "s5"], ["registration", "how it was measured", "s3"], ["numerical", "mesh", "s4"],
-    ["parameters", "moduli, springs, gland", "s6"], ["patchiness", "uneven tissue and skin", "s6"],
+    ["parameters", supine.of_body("moduli, springs, gland", "moduli, springs"), "s6"],
+    ["patchiness", supine.of_body("uneven tissue and skin", "uneven material"), "s6"],
     ["model_form", "what no effect explains", "s2"], ["total", "whole error, RMS", "s1"]];
 
   supine.budget = () => {

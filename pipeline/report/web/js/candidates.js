@@ -87,7 +87,7 @@
       left: `${number(h.unexplained_mm, 1)} [${number(h.unexplained95[0], 1)}, ${number(h.unexplained95[1], 1)}]` }));
     return supine.table_figure("hypotheses", "What may be missing", [{ title: "hypothesis", key: "name" },
       { title: "probability", key: "probability", digits: 2 }, { title: "unexplained, mm [95 %]", key: "left" }], rows,
-    { caption: "The place of each scan, gravity, breath, springs, the gland, uneven tissue, skin and muscle are fitted in every one of them." });
+    { caption: `The place of each scan, gravity, ${supine.of_body("breath, springs, the gland, uneven tissue, skin and muscle", "springs and uneven material")} are fitted in every one of them.` });
   };
 
   // A hint where no effect explains the rest.

@@ -12,7 +12,7 @@
   };
   const css = (rgb) => `rgb(${rgb.join(",")})`;
   const not_measured = [168, 172, 178];
-  const region = { 1: ["inner side, on the muscle", [86, 180, 233]], 2: ["skin", [231, 190, 158]], 3: ["ligament ring", [0, 158, 115]],
+  const region = { 1: [supine.of_body("inner side, on the muscle", "on a support"), [86, 180, 233]], 2: ["skin", [231, 190, 158]], 3: ["ligament ring", [0, 158, 115]],
     4: ["cut", [120, 120, 120]] };
   const organ = { gland: [204, 121, 167], tumour: [213, 60, 0], nipple: [160, 82, 45], vessel: [86, 60, 180] };
 

@@ -21,10 +21,10 @@
     }
   };
   page.replaceChildren(
-    el("header", { class: "top" }, el("h1", {}, data.case.name), el("p", {}, `Supine report · ${data.case.side} breast${data.case.side === "both" ? "s" : ""}`)),
+    el("header", { class: "top" }, el("h1", {}, data.case.name), el("p", {}, `Supine report${supine.of_body(` · ${data.case.side} breast${data.case.side === "both" ? "s" : ""}`, "")}`)),
     el("nav", { "aria-label": "parts of the report" }, parts.map(([name, title]) => el("a", { href: "#" + name }, title))),
     ...parts.map(([name]) => draw(name)),
-    el("footer", {}, `Supine ${data.version}${data.commit ? " (" + data.commit + ")" : ""}. Research software, not a medical device. Lengths in mm, coordinates patient LPS.`));
+    el("footer", {}, `Supine ${data.version}${data.commit ? " (" + data.commit + ")" : ""}. Research software, not a medical device. Lengths in mm, coordinates ${supine.of_body("patient LPS", "as in the case")}.`));
 
   document.addEventListener("DOMContentLoaded", () => {
     const holder = document.getElementById("view3d");

@@ -68,5 +68,5 @@
   };
 
   supine.mesh = () => section("mesh", "Image, mesh, certificate", certificate(), surface(), el("div", { class: "columns" }, volumes(), regions(), quality()),
-    data.figures["labels.json"] ? "" : gap("segment"), pictures());
+    data.figures["labels.json"] || !supine.stage("segment") ? "" : gap("segment"), pictures());
 })();

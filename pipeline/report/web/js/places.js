@@ -39,7 +39,7 @@
     const columns = [{ title: "area", key: "area" }, { title: "cm²", key: "area_cm2", digits: 0 }, ...shown.flatMap((c, k) => [
       { title: `signed mean, ${c.model}`, key: "signed" + k, n: true, show: (v) => supine.signed(v, 2) }, { title: `MAE, ${c.model}`, key: "mae" + k, digits: 2 }])];
     return [supine.figure("areas-chart", `Mean signed distance per area, ${last.model}, mm`, supine.chart.bars("Mean signed distance per area",
-      last.figures.areas.map((a) => ({ label: a.name, value: a.mean_signed_mm, cls: a.mean_signed_mm > 0 ? "s2" : "s1" })), "mm; right: the breast reaches further than the model", { sign: true, digits: 1 }),
+      last.figures.areas.map((a) => ({ label: a.name, value: a.mean_signed_mm, cls: a.mean_signed_mm > 0 ? "s2" : "s1" })), `mm; right: the ${supine.of_body("breast", "body")} reaches further than the model`, { sign: true, digits: 1 }),
     { rows: last.figures.areas, columns: [{ title: "area", key: "name" }, { title: "signed mean, mm", key: "mean_signed_mm", digits: 2 }] }),
     supine.table_figure("areas", `Areas of the skin, ${data.case.predicted}, mm`, columns, rows)];
   };

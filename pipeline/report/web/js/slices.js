@@ -120,6 +120,7 @@
 
   supine.slices = () => {
     const volume = data.slices;
+    if (!volume && !supine.stage("segment")) return section("slices", "Slices", el("p", {}, "The image is a surface: there is no volume to cut."));
     if (!volume) return section("slices", "Slices", el("div", { class: "gap" }, "No volume has been carried into the pose yet. To get it: ", supine.command(data.commands.warp)));
     const found = supine.targets_of(volume.pose);
     supine.slice_view = new Slices(volume, found ? found.points : []);

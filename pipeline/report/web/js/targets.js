@@ -8,7 +8,14 @@
   const targets_file = (pose) => `targets/${pose}_landmarks.json`;
   supine.targets_of = (pose) => data.figures[targets_file(pose)] || null;
 
-  const depth = (d) => (d ? `${number(d.mm, 1)} ± ${number(1.96 * d.sd_mm, 1)}` : "–");
+  // Whether the regions allow for effects that the model may lack, and which are likeliest.
+  const over_what = (found) => {
+    if (!found.may_be_missing) return "It was taken that the model lacks nothing. ";
+    const words = found.may_be_missing.slice(0, 3).map(({ effects, probability }) => `${effects.join(" and ") || "nothing"} (${number(probability, 2)})`);
+    return `Over what the model may lack, likeliest first: ${words.join(", ")}. `;
+  };
+  const on_skin_mm = 0.5; // what is marked on the skin may lie as much outside the model's as inside
+  const depth = (d) => (!d ? "–" : d.mm < on_skin_mm ? "on the skin" : `${number(d.mm, 1)} ± ${number(1.96 * d.sd_mm, 1)}`);
   const table = (pose) => {
     const found = supine.targets_of(pose);
     const rows = found.points.map((p) => ({ point: p.name, x: p.place_mm[0], y: p.place_mm[1], z: p.place_mm[2], half_axes_mm: p.half_axes_mm, nearest_skin_mm: p.nearest_skin && p.nearest_skin.mm,
@@ -20,7 +27,7 @@
       { title: "surer most by", key: "most", show: (v) => v || "–" }, { title: "less variance", key: "share", n: true, show: (v) => (v === null ? "–" : number(100 * v, 0) + " %") }];
     const file = targets_file(pose);
     return supine.table_figure(`targets-${pose}`, `Points in ${pose}, mm`, columns, rows, { caption: el("span", {}, found.scan_counts ? "With all that was measured. " : "Nothing was measured: by what the model believes. ",
-      "Unexplained ", shown(file, ["unexplained_mm"]), " mm, mesh ", shown(file, ["mesh_mm"]), found.mesh_measured ? " mm." : " mm (a usual share of the way).", " Depths with their 95 % reach.") });
+      over_what(found), "Unexplained ", shown(file, ["unexplained_mm"]), " mm, mesh ", shown(file, ["mesh_mm"]), found.mesh_measured ? " mm." : " mm (a usual share of the way).", " Depths with their 95 % reach.") });
   };
 
   supine.targets = () => {

@@ -17,7 +17,7 @@ class View {
     this.morph = 2;
     this.colour = model.distance_of(this.state, this.pose) ? "distance" : "plain";
     this.show = { skin: 1, organs: true, scan: "off", muscle: false, landmarks: true, labels: true, ghost: false, regions: false };
-    this.place = el("div", { class: "scene", tabindex: 0, role: "application", "aria-label": "3-D view of the breast; arrow keys turn it, plus and minus zoom, 1 to 5 are views" });
+    this.place = el("div", { class: "scene", tabindex: 0, role: "application", "aria-label": `3-D view of the ${supine.of_body("breast", "body")}; arrow keys turn it, plus and minus zoom, 1 to 5 are views` });
     this.panel = el("div", { class: "panel" });
     this.status = el("p", { class: "hint", role: "status", "aria-live": "polite" });
     this.legend = el("div", { class: "legend" });
@@ -76,7 +76,9 @@ class View {
     const { imaged } = supine.data.case;
     this.morph_input = slider(`from ${imaged} over undeformed to the pose`, 100 * this.morph, 0, 200, (v) => this.set_morph(v / 100));
     const stop = (label, at) => el("button", { type: "button", "data-morph": at, onclick: () => this.go(at) }, label);
-    const { show } = this, both = supine.data.case.side === "both";
+    const { show } = this, both = supine.data.case.side === "both", of_body = supine.of_body;
+    const views = of_body([["front", "front"], ["outer", both ? "left side" : "outer side"], ["inner", both ? "right side" : "inner side"], ["feet", "feet"], ["head", "head"]],
+      [["front", "front"], ["outer", "one end"], ["inner", "other end"], ["feet", "below"], ["head", "above"]]);
     const set = (key) => (value) => { show[key] = value; this.update(); };
     this.panel.replaceChildren(rung.node, pose, group("Shape", this.morph_input, el("div", { class: "stops" }, imaged === "undeformed" ? "" : stop(imaged, 0), stop("undeformed", 1), stop(this.pose, 2))),
       choice("Colour of the skin", [{ id: "distance", label: "distance" }, { id: "region", label: "regions" }, { id: "plain", label: "plain" }], this.colour, (id) => { this.colour = id; this.update(); }).node,
@@ -85,9 +87,8 @@ class View {
         picker("measured scan ", [["off", "off"], ["points", "points"], ["surface", "surface"]], show.scan, set("scan")),
         check_box("landmarks (● predicted, ○ measured)", show.landmarks, set("landmarks")), check_box("names of what is off", show.labels, set("labels")),
         model.targets_of(this.pose).length ? check_box("95 % regions and depths", show.regions, set("regions")) : "",
-        check_box(`${imaged} shape beside it`, show.ghost, set("ghost")), check_box(supine.data.case.side === "none" ? "supports" : "chest muscle", show.muscle, set("muscle"))),
-      group("Look from", el("div", { class: "row" }, [["front", "front"], ["outer", both ? "left side" : "outer side"], ["inner", both ? "right side" : "inner side"], ["feet", "feet"], ["head", "head"]]
-        .map(([id, label]) => el("button", { type: "button", "data-view": id, onclick: () => this.view(id) }, label)))),
+        check_box(`${imaged} shape beside it`, show.ghost, set("ghost")), check_box(of_body("chest muscle", "supports"), show.muscle, set("muscle"))),
+      group("Look from", el("div", { class: "row" }, views.map(([id, label]) => el("button", { type: "button", "data-view": id, onclick: () => this.view(id) }, label)))),
       model.targets_of(this.pose).length ? el("button", { type: "button", "data-id": "table", onclick: () => this.on_the_table() }, `Targets in ${this.pose}`) : "",
       el("p", { class: "hint" }, "Drag to turn, wheel to zoom. Keys in the picture: arrows, + −, 1 to 5, 0."),
       el("button", { type: "button", onclick: () => this.save() }, "Scan and distances as CSV"));

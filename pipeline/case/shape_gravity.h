@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <filesystem>
+
+#include "pipeline/case/case.h"
+
+namespace supine::pipeline {
+
+/// Whether a shape was computed with the gravity that the case states now. supine-simulate writes it beside POSE.vtu,
+/// into POSE.json; a shape without it, of another tool, is taken as it is.
+/// @throws InputError  both directions, and what to do
+void check_gravity(const std::filesystem::path& shape, const Pose& pose);
+
+}  // namespace supine::pipeline
