@@ -153,8 +153,7 @@ void check_area(const std::filesystem::path& file, const Surface& surface) {
     if ((b - a).cross(c - a).norm() > 0) return;
   }
   if (surface.triangles.rows() > 0)
-    throw InputError(fmt::format("{}: none of its {} triangles has an area; write the file again", file.string(),
-                                 surface.triangles.rows()));
+    throw InputError(fmt::format("{}: none of its triangles has an area; write the file again", file.string()));
 }
 
 void copy_region(vtkPolyData* data, const std::filesystem::path& file, Surface& surface) {

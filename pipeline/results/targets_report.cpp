@@ -185,7 +185,7 @@ std::vector<diagnosis::LikelySet> read_likely_sets(const std::filesystem::path& 
     throw refuse(why.what());
   }
   constexpr double rounding = 1e-6;
-  if (!(sum <= 1 + rounding)) throw refuse(fmt::format("probabilities add up to {} (bound 1)", sum));
+  if (!(sum <= 1 + rounding)) throw refuse(fmt::format("probabilities add up to {:.4g} (bound 1)", sum));
   return sets;
 }
 
