@@ -88,7 +88,7 @@ void weigh_by_class(Fit& fit, GlandOptions::Contrast contrast) {
     const double c = contrast_of(s.value, contrast), t = s.value / fit.sd;
     const double fat = (1 - fit.prior) * std::exp(-t * t / 2) / (fit.sd * std::sqrt(2 * std::numbers::pi));
     const double gland = c > 0 ? fit.prior / usual_pure : 0;
-    s.weight = static_cast<float>(fat / (fat + gland + other_side));
+    s.weight = static_cast<float>(fat / (fat + gland + (c > 0 ? other_side : 0)));
     squares += s.weight * s.value * static_cast<double>(s.value);
     sum += s.weight;
   }
