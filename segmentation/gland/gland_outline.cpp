@@ -10,9 +10,8 @@ namespace supine::segmentation {
 namespace {
 
 constexpr double around_mm = 8;          // standard deviation of "around there"
-constexpr double reach = 2.5;            // of them; farther from sure gland nothing is told
 constexpr double single_voxel_mm = 0.8;  // noise of single voxels is smoothed by this much
-constexpr float least_weight = 1e-6F;
+constexpr float least_weight = 1e-4F;
 
 /// The contrast that sure gland has around each voxel; what shows more of it counts more. 0 far from all of it.
 std::vector<float> usual_contrast(const Mask& sure, const FatLevel& fat, const Grid& grid) {
@@ -53,12 +52,11 @@ void keep_what_holds(const Mask& sure, const Grid& grid, double bridge_mm, Mask&
 Mask outline_gland(const Mask& sure, const Mask& possible, const FatLevel& fat, const Grid& grid,
                    const GlandOptions& options) {
   const std::vector<float> usual = usual_contrast(sure, fat, grid), contrast = smooth_contrast(possible, fat, grid);
-  const Mask near = dilate(sure, grid, reach * around_mm);
   Mask outline(sure.size());
   for (std::size_t n = 0; n < outline.size(); ++n) {
     const double least =
         std::max(options.least_deviations * fat.deviation[n], options.least_share * static_cast<double>(usual[n]));
-    outline[n] = possible[n] && near[n] && contrast[n] >= least;
+    outline[n] = possible[n] && usual[n] > 0 && contrast[n] >= least;
   }
   keep_what_holds(sure, grid, options.bridge_mm, outline);
   if (options.gap_mm <= 0) return outline;
