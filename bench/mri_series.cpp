@@ -162,12 +162,16 @@ int table(phantom::Series series, std::uint64_t first, int count, const std::str
   return 0;
 }
 
-void plant(const char* what, const segmentation::GreyImage& image, bool fat_bright) {
+/// With the truth of an image that ends at exit 0 or 1, how right it is all the same.
+void plant(const char* what, const segmentation::GreyImage& image, bool fat_bright, const phantom::Torso* torso = {},
+           const segmentation::LabelImage* truth = {}) {
   try {
     const auto result = segment(image, fat_bright);
     std::string said;
     for (const auto& doubt : result.doubts) said += fmt::format("{}{}", said.empty() ? "" : "; ", doubt.what);
-    fmt::print("| {} | {} | {} |\n", what, result.doubts.empty() ? 0 : 1, said.empty() ? "nothing" : said);
+    if (said.empty()) said = "nothing";
+    if (torso) said += fmt::format(" (breast Dice {:.3f})", score(*torso, {image, *truth, {}}, result).breast);
+    fmt::print("| {} | {} | {} |\n", what, result.doubts.empty() ? 0 : 1, said);
   } catch (const InputError& error) {
     fmt::print("| {} | 2 | {} |\n", what, error.what());
   }
@@ -186,6 +190,18 @@ segmentation::GreyImage half_of(const segmentation::GreyImage& image, double fro
     for (int j = 0; j < image.grid.size.y(); ++j)
       for (int i = low; i <= high; ++i) part.voxels.push_back(image.at(i, j, k));
   return part;
+}
+
+/// An image with a bright plate between two depths.
+segmentation::GreyImage with_plate(segmentation::GreyImage image, double from_y_mm, double to_y_mm) {
+  const segmentation::Grid& grid = image.grid;
+  for (int k = 0; k < grid.size.z(); ++k)
+    for (int j = 0; j < grid.size.y(); ++j)
+      for (int i = 0; i < grid.size.x(); ++i) {
+        const Eigen::Vector3d p = grid.point(Eigen::Vector3d(i, j, k));
+        if (p.y() > from_y_mm && p.y() < to_y_mm && std::abs(p.x()) < 150) image.at(i, j, k) += 400;
+      }
+  return image;
 }
 
 int planted(std::uint64_t seed) {
@@ -212,14 +228,12 @@ int planted(std::uint64_t seed) {
   phantom::Torso lone(seed);
   lone.remove(0);
   plant("one breast absent", phantom::make_series(lone, seed, {}).image, true);
-  segmentation::GreyImage table = t1;
-  for (int k = 0; k < t1.grid.size.z(); ++k)
-    for (int j = 0; j < t1.grid.size.y(); ++j)
-      for (int i = 0; i < t1.grid.size.x(); ++i) {
-        const Eigen::Vector3d p = t1.grid.point(Eigen::Vector3d(i, j, k));
-        if (std::abs(p.y() - torso.nipple_mm(0).y() + 4) < 6 && std::abs(p.x()) < 150) table.at(i, j, k) += 400;
-      }
-  plant("table in the body (a bright plate at the nipples)", table, true);
+  const phantom::MadeSeries clean = phantom::make_series(torso, seed, {});
+  const double tip = torso.nipple_mm(0).y();
+  plant("table in the body (a bright plate through the nipples)", with_plate(t1, tip - 2, tip + 10), true, &torso,
+        &clean.truth);
+  plant("table that the breasts lie on, as bright as they are", with_plate(t1, tip - 22, tip + 6), true, &torso,
+        &clean.truth);
   return 0;
 }
 

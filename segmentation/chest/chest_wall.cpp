@@ -9,6 +9,7 @@
 
 #include "common/error.h"
 #include "segmentation/chest/boundary_cost.h"
+#include "segmentation/chest/cheapest_surface.h"
 #include "segmentation/chest/sampler.h"
 
 namespace supine::segmentation {
@@ -20,99 +21,38 @@ constexpr double one_degree = std::numbers::pi / 180;
 constexpr double superellipse_reach_mm = 25;  // a place farther from it is pulled no harder
 constexpr double superellipse_blur_mm = 4;    // to either side of the superellipse that counts for it
 constexpr double coupling_reach_mm = 20;      // a neighbour farther off pulls no harder
-constexpr int most_sweeps = 12;
 // Lines are seen best along their own course: the rays start from what is known of it and are averaged over
 // their neighbours.
 struct Look {
   double reach_mm;     // to either side of what is known
   int angles, levels;  // averaged to either side
+  bool even;           // looks for one wall that fits both sides: false lines of one side are not lines of the other
 };
-constexpr Look first_look{0, 1, 1}, closer_looks[] = {{30, 3, 2}, {10, 4, 3}};
+constexpr Look first_look{0, 1, 1, false}, closer_looks[] = {{30, 3, 2, true}, {10, 4, 3, false}};
+constexpr double uneven_mm = 3;  // that the two sides of a chest differ
 
-using Chains = std::vector<std::vector<int>>;
-
-/// min over j of value[j] + slope |i - j|, and the j it is reached at.
-void spread(std::vector<double>& value, std::vector<int>& from, double slope) {
-  const int n = static_cast<int>(value.size());
-  for (int i = 0; i < n; ++i) from[i] = i;
-  for (int i = 1; i < n; ++i)
-    if (value[i - 1] + slope < value[i]) {
-      value[i] = value[i - 1] + slope;
-      from[i] = from[i - 1];
+/// The cheapest border over the samples of the rays, with the pull of the superellipse.
+std::vector<int> search(const RayProfiles& profiles, const std::vector<float>& costs, const ChestWall& wall,
+                        const ChestWallOptions& options) {
+  constexpr double step = RayProfiles::step_mm;
+  SurfaceProblem problem{static_cast<int>(profiles.angles()),
+                         static_cast<int>(profiles.levels()),
+                         profiles.count,
+                         costs,
+                         options.stiffness_per_mm * step,
+                         options.coupling_per_mm * step,
+                         options.coupling_per_mm * coupling_reach_mm};
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index k = 0; k < profiles.levels(); ++k)
+    for (Eigen::Index a = 0; a < profiles.angles(); ++a) {
+      const double oval = (wall.superellipse.radius_mm(wall.angle(a), wall.z(k)) - profiles.radius_mm(a, k, 0)) / step;
+      float* cost = problem.costs.data() + profiles.ray(a, k) * profiles.count;
+      for (int i = 0; i < profiles.count; ++i)
+        cost[i] +=
+            static_cast<float>(options.oval_pull_per_mm * std::min(superellipse_reach_mm, step * std::abs(i - oval)));
     }
-  for (int i = n - 2; i >= 0; --i)
-    if (value[i + 1] + slope < value[i]) {
-      value[i] = value[i + 1] + slope;
-      from[i] = from[i + 1];
-    }
+  return cheapest_surface(problem);
 }
-
-/// The search for the cheapest surface over the samples of the rays.
-class Search {
- public:
-  Search(const RayProfiles& profiles, const std::vector<float>& costs, const ChestWall& wall,
-         const ChestWallOptions& options)
-      : profiles_(profiles), costs_(costs), options_(options) {
-    superellipse_.resize(profiles.angles(), profiles.levels());
-    for (Eigen::Index k = 0; k < profiles.levels(); ++k)
-      for (Eigen::Index a = 0; a < profiles.angles(); ++a)
-        superellipse_(a, k) = (wall.superellipse.radius_mm(wall.angle(a), wall.z(k)) - profiles.radius_mm(a, k, 0)) /
-                              RayProfiles::step_mm;
-  }
-
-  /// Sweeps over the levels until no chain changes.
-  Chains settle() const {
-    Chains chains;
-    const auto n = static_cast<int>(profiles_.levels());
-    for (int k = 0; k < n; ++k) chains.push_back(cheapest(k, {}));
-    for (int sweep = 0; sweep < most_sweeps; ++sweep) {
-      bool changed = false;
-      for (int step = 0; step < n; ++step) {
-        const int k = sweep % 2 == 0 ? step : n - 1 - step;
-        std::vector<const std::vector<int>*> neighbours;
-        if (k > 0) neighbours.push_back(&chains[k - 1]);
-        if (k + 1 < n) neighbours.push_back(&chains[k + 1]);
-        auto chain = cheapest(k, neighbours);
-        changed |= chain != chains[k];
-        chains[k] = std::move(chain);
-      }
-      if (!changed) break;
-    }
-    return chains;
-  }
-
- private:
-  /// Cost of a sample with the pulls of the superellipse and of the neighbouring levels.
-  double cost(Eigen::Index a, int k, int i, const std::vector<const std::vector<int>*>& neighbours) const {
-    constexpr double step = RayProfiles::step_mm;
-    double sum = costs_[profiles_.ray(a, k) * profiles_.count + i] +
-                 options_.oval_pull_per_mm * std::min(superellipse_reach_mm, step * std::abs(i - superellipse_(a, k)));
-    for (const auto* other : neighbours)
-      sum += options_.coupling_per_mm * std::min(coupling_reach_mm, step * std::abs(i - (*other)[a]));
-    return sum;
-  }
-  /// The cheapest chain of samples over the rays of a level.
-  std::vector<int> cheapest(int k, const std::vector<const std::vector<int>*>& neighbours) const {
-    const auto angles = static_cast<std::size_t>(profiles_.angles());
-    const int n = profiles_.count;
-    std::vector<std::vector<int>> from(angles, std::vector<int>(n));
-    std::vector<double> value(n);
-    for (int i = 0; i < n; ++i) value[i] = cost(0, k, i, neighbours);
-    for (std::size_t a = 1; a < angles; ++a) {
-      spread(value, from[a], options_.stiffness_per_mm * RayProfiles::step_mm);
-      for (int i = 0; i < n; ++i) value[i] += cost(static_cast<Eigen::Index>(a), k, i, neighbours);
-    }
-    std::vector<int> chain(angles);
-    chain.back() = static_cast<int>(std::min_element(value.begin(), value.end()) - value.begin());
-    for (std::size_t a = angles - 1; a > 0; --a) chain[a - 1] = from[a][chain[a]];
-    return chain;
-  }
-
-  const RayProfiles& profiles_;
-  const std::vector<float>& costs_;
-  const ChestWallOptions& options_;
-  Eigen::ArrayXXd superellipse_;  // sample of the superellipse on each ray
-};
 
 /// Makes places dear that lie far in front of the skin over the sternum of their level: there is breast.
 void hold_back(const FrontSkin& front, const ChestWall& wall, const RayProfiles& profiles,
@@ -183,15 +123,37 @@ double half_way(const GreyImage& image, const ChestWallOptions& options, const E
   return best;
 }
 
+/// Gives a ray and its mirror image the mean of their costs, each over uneven_mm to either side.
+void make_even(const RayProfiles& profiles, std::vector<float>& costs) {
+  const int blur = static_cast<int>(uneven_mm / RayProfiles::step_mm), n = profiles.count;
+  const std::vector<float> before = costs;
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index k = 0; k < profiles.levels(); ++k)
+    for (Eigen::Index a = 0; a < profiles.angles(); ++a) {
+      const float* own = before.data() + profiles.ray(a, k) * n;
+      const float* other = before.data() + profiles.ray(profiles.angles() - 1 - a, k) * n;
+      float* cost = costs.data() + profiles.ray(a, k) * n;
+      for (int i = 0; i < n; ++i) {
+        float sum = 0, weight = 0;
+        for (int j = std::max(0, i - blur); j <= std::min(n - 1, i + blur); ++j) {
+          const auto w = static_cast<float>(blur + 1 - std::abs(i - j));
+          sum += w * (own[j] + other[j]) / 2;
+          weight += w;
+        }
+        cost[i] = sum / weight;
+      }
+    }
+}
+
 /// Takes the cheapest border over to the wall.
 void settle(const RayProfiles& profiles, const std::vector<float>& costs, const ChestWallOptions& options,
             ChestWall& wall) {
-  const Chains chains = Search(profiles, costs, wall, options).settle();
+  const std::vector<int> chosen = search(profiles, costs, wall, options);
   wall.radius_mm.resize(profiles.angles(), profiles.levels());
   wall.cost.resize(profiles.angles(), profiles.levels());
   for (Eigen::Index k = 0; k < profiles.levels(); ++k)
     for (Eigen::Index a = 0; a < profiles.angles(); ++a) {
-      const int i = chains[k][a];
+      const int i = chosen[profiles.ray(a, k)];
       wall.cost(a, k) = profiles.seen(a, k) ? costs[profiles.ray(a, k) * profiles.count + i] : NAN;
       wall.radius_mm(a, k) = profiles.radius_mm(a, k, i);
     }
@@ -266,6 +228,7 @@ ChestWall find_chest_wall(const GreyImage& image, const Mask& body, const Torso&
     blur_profiles(profiles, look.angles, look.levels);
     costs = boundary_costs(profiles, options, true);
     hold_back(front, wall, profiles, options, costs);
+    if (look.even) make_even(profiles, costs);
     settle(profiles, costs, options, wall);
   }
   return wall;

@@ -51,9 +51,9 @@ struct ChestWall {
   double depth_mm(const Eigen::Vector3d& point) const;
 };
 
-/// Finds the border between dark muscle and bright fat as the cheapest smooth surface (see ChestWallOptions): dynamic
-/// programming along the rays of a level, repeated over the levels with their neighbours' radii as a pull until it
-/// settles; then moved to the half-way grey, to a fraction of a voxel.
+/// Finds the border between muscle and fat as the cheapest smooth sheet over all rays (cheapest_surface; costs in
+/// ChestWallOptions). Border::step: then moved to the half-way grey, to a fraction of a voxel. Border::line: looked for
+/// twice more near to what is known, first as one sheet that fits both sides of the chest.
 /// @param image  fat 100
 /// @throws InputError  options out of range; the rays' centre outside the image
 ChestWall find_chest_wall(const GreyImage& image, const Mask& body, const Torso& torso,

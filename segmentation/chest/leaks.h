@@ -20,7 +20,13 @@ struct Leak {
 /// @param least_cm2  smaller patches are noise
 std::vector<Leak> find_leaks(const ChestWall& wall, double back_y_mm, double least_cm2 = 5);
 
+/// Patches of the wall, in front of @p back_y_mm on both sides, where one side of the chest lies much farther forward
+/// than the other, beyond what the whole chest does (a body that lies turned): chests are even to within a few
+/// millimetres, so one side is wrong. The middle is that of the side that lies in front. Largest first.
+std::vector<Leak> find_uneven(const ChestWall& wall, double back_y_mm, double least_cm2 = 5);
+
 /// A line for a person.
 std::string describe(const Leak& leak);
+std::string describe_uneven(const Leak& patch);
 
 }  // namespace supine::segmentation

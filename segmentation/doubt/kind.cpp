@@ -56,7 +56,8 @@ void require_kind(const Segmented& segmented) {
     throw InputError(
         fmt::format("another kind of image: the muscle is {:.2f} times as bright as the fat in front of it (bound "
                     "{:.2f}), so this is not "
-                    "T1 without fat suppression; take the recipe for fat suppression (fatsat_auto), or another series",
+                    "T1 without fat suppression, or its front is its back; take the recipe for fat suppression "
+                    "(fatsat_auto), or another series",
                     share, suppressed_share));
   if (segmented.fat_suppressed && share < plain_share)
     throw InputError(

@@ -35,6 +35,24 @@ double BSplineField::Lattice::at(int i, int j, int k) const {
   return sum;
 }
 
+/// Along a row the weights across it are the same for all: the control points are summed with them once.
+void BSplineField::Lattice::add_row(int j, int k, std::vector<float>& values) const {
+  const auto &wy = axis[1].weight[j], &wz = axis[2].weight[k];
+  const auto points = static_cast<std::size_t>(axis[0].points);
+  std::vector<float> across(points, 0);
+  for (int c = 0; c < 4; ++c)
+    for (int b = 0; b < 4; ++b) {
+      const float* from = control.data() + points * (axis[1].first[j] + b +
+                                                     static_cast<std::size_t>(axis[1].points) * (axis[2].first[k] + c));
+      for (std::size_t n = 0; n < points; ++n) across[n] += wz[c] * wy[b] * from[n];
+    }
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto& wx = axis[0].weight[i];
+    const float* at = across.data() + axis[0].first[i];
+    values[i] += wx[0] * at[0] + wx[1] * at[1] + wx[2] * at[2] + wx[3] * at[3];
+  }
+}
+
 void BSplineField::add(std::span<const FieldSample> samples, double spacing_mm) {
   Lattice lattice;
   for (int a = 0; a < 3; ++a) lattice.axis[a] = make_axis(grid_.size[a], grid_.spacing_mm[a], spacing_mm);
@@ -63,7 +81,15 @@ void BSplineField::add(std::span<const FieldSample> samples, double spacing_mm) 
   constexpr double held = 1e-4;
   lattice.control.resize(count);
   for (std::size_t n = 0; n < count; ++n) lattice.control[n] = static_cast<float>(pull[n] / (weight[n] + held));
-  lattices_.push_back(std::move(lattice));
+  const auto same_points = [&lattice](const Lattice& other) {
+    return std::equal(std::begin(lattice.axis), std::end(lattice.axis), std::begin(other.axis),
+                      [](const Axis& a, const Axis& b) { return a.points == b.points; });
+  };
+  const auto same = std::find_if(lattices_.begin(), lattices_.end(), same_points);
+  if (same == lattices_.end())
+    lattices_.push_back(std::move(lattice));
+  else  // two fields over the same control points are one
+    for (std::size_t n = 0; n < count; ++n) same->control[n] += lattice.control[n];
 }
 
 double BSplineField::at(int i, int j, int k) const {
@@ -72,12 +98,20 @@ double BSplineField::at(int i, int j, int k) const {
   return sum;
 }
 
+std::vector<float> BSplineField::row(int j, int k) const {
+  std::vector<float> values(static_cast<std::size_t>(grid_.size.x()), static_cast<float>(constant_));
+  for (const Lattice& lattice : lattices_) lattice.add_row(j, k, values);
+  return values;
+}
+
 std::vector<float> BSplineField::evaluate() const {
   std::vector<float> field(grid_.count());
 #pragma omp parallel for schedule(static)
   for (int k = 0; k < grid_.size.z(); ++k)
-    for (int j = 0; j < grid_.size.y(); ++j)
-      for (int i = 0; i < grid_.size.x(); ++i) field[grid_.index(i, j, k)] = static_cast<float>(at(i, j, k));
+    for (int j = 0; j < grid_.size.y(); ++j) {
+      const std::vector<float> values = row(j, k);
+      std::copy(values.begin(), values.end(), field.begin() + static_cast<std::ptrdiff_t>(grid_.index(0, j, k)));
+    }
   return field;
 }
 

@@ -88,7 +88,7 @@ void weigh_by_class(Fit& fit, GlandOptions::Contrast contrast) {
     const double c = contrast_of(s.value, contrast), t = s.value / fit.sd;
     const double fat = (1 - fit.prior) * std::exp(-t * t / 2) / (fit.sd * std::sqrt(2 * std::numbers::pi));
     const double gland = c > 0 ? fit.prior / usual_pure : 0;
-    s.weight = static_cast<float>(fat / (fat + gland + other_side));
+    s.weight = static_cast<float>(fat / (fat + gland + (c > 0 ? other_side : 0)));
     squares += s.weight * s.value * static_cast<double>(s.value);
     sum += s.weight;
   }
@@ -153,16 +153,17 @@ FatLevel find_fat_level(const GreyImage& image, const Mask& inner, const Mask& u
   const Grid& grid = image.grid;
 #pragma omp parallel for schedule(static)
   for (int k = 0; k < grid.size.z(); ++k)
-    for (int j = 0; j < grid.size.y(); ++j)
+    for (int j = 0; j < grid.size.y(); ++j) {
+      const std::vector<float> fat = level.row(j, k), log_variance = variance.row(j, k);
       for (int i = 0; i < grid.size.x(); ++i) {
         const std::size_t n = grid.index(i, j, k);
         if (!inner[n]) continue;
-        const double fat = level.at(i, j, k);
         result.contrast[n] =
-            static_cast<float>(contrast_of(std::log(std::max(image.voxels[n], least_grey)) - fat, options.contrast));
-        result.deviation[n] = static_cast<float>(std::max(least_sd, std::exp(variance.at(i, j, k) / 2)));
-        result.shading[n] = static_cast<float>(std::exp(fat - middle));
+            static_cast<float>(contrast_of(std::log(std::max(image.voxels[n], least_grey)) - fat[i], options.contrast));
+        result.deviation[n] = static_cast<float>(std::max(least_sd, std::exp(log_variance[i] / 2.0)));
+        result.shading[n] = static_cast<float>(std::exp(fat[i] - middle));
       }
+    }
   return result;
 }
 

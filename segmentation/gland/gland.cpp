@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "segmentation/gland/fat_level.h"
+#include "segmentation/gland/gland_outline.h"
 #include "segmentation/gland/gland_place.h"
 #include "segmentation/gland/tissue_classes.h"
 
@@ -71,14 +72,16 @@ GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const Gl
       classify_gland(fat.contrast, fat.deviation, inner, grid, result.pure, options.neighbourhood);
   Mask looks(inner.size());
   for (std::size_t n = 0; n < looks.size(); ++n) looks[n] = classes.probability[n] > 0.5f;
-  result.gland = where_gland_lies(looks, place, depths, grid, options);
-  result.aside_ml = volume_ml(looks, grid) - volume_ml(result.gland, grid);
+  const Mask sure = where_gland_lies(looks, place, depths, grid, options);
+  result.aside_ml = volume_ml(looks, grid) - volume_ml(sure, grid);
+  result.gland = outline_gland(sure, where_gland_may_lie(inner, place, depths, grid, options), fat, grid, options);
   result.fraction.assign(inner.size(), 0);
-  const Mask near = dilate(result.gland, grid, options.bridge_mm);
+  Mask near(sure.size());
+  for (std::size_t n = 0; n < near.size(); ++n) near[n] = sure[n] || result.gland[n];
+  near = dilate(near, grid, options.bridge_mm);
   for (std::size_t n = 0; n < inner.size(); ++n) {
     const float share = std::clamp<float>(fat.contrast[n] / static_cast<float>(result.pure), 0, 1);
-    if (near[n] && inner[n]) result.fraction[n] = classes.probability[n] * share;
-    result.gland[n] = result.gland[n] && share >= static_cast<float>(options.least_share);
+    if (near[n] && inner[n]) result.fraction[n] = (result.gland[n] ? 1 : classes.probability[n]) * share;
   }
   return result;
 }

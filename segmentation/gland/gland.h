@@ -13,16 +13,18 @@ namespace supine::segmentation {
 struct GlandOptions {
   /// dark: gland is darker than fat (T1). bright: brighter (fat suppressed).
   enum class Contrast { dark, bright } contrast = Contrast::dark;
-  double shading_mm = 30;      ///< the finest lattice of the shading's B-splines; > 0
-  double neighbourhood = 0.3;  ///< of the Potts field; >= 0
-  double skin_mm = 5;          ///< next to the outside nothing is gland: skin, half-empty voxels; > 0
-  double chest_mm = 4;         ///< nor next to the chest; >= 0
-  double superficial_mm = 9;   ///< to here vessels and blurred skin run: gland only near the nipple
-  double fan_deg = 70;         ///< of a line from the nipple against the way to the chest; farther aside is axilla
-  double bridge_mm = 4;        ///< gaps that connected gland may have; >= 0
-  double least_ml = 0.3;       ///< smaller islands are not gland
-  double least_share = 0.35;   ///< of gland in a voxel that is labelled gland, 0 to below 1; 0 = any
-  double failed_share = 1.6;   ///< bright: where fat is brighter than so many times its median, suppression failed
+  double shading_mm = 20;       ///< the finest lattice of the shading's B-splines; > 0
+  double neighbourhood = 0.3;   ///< of the Potts field; >= 0
+  double skin_mm = 5;           ///< next to the outside nothing is gland: skin, half-empty voxels; > 0
+  double chest_mm = 4;          ///< nor next to the chest; >= 0
+  double superficial_mm = 9;    ///< to here vessels and blurred skin run: gland only near the nipple
+  double fan_deg = 70;          ///< of a line from the nipple against the way to the chest; farther aside is axilla
+  double bridge_mm = 4;         ///< gaps that connected gland may have; >= 0
+  double least_ml = 0.3;        ///< smaller islands are not gland
+  double least_share = 0.4;     ///< of the contrast that gland has around a voxel that is labelled; 0 to below 1
+  double least_deviations = 2;  ///< of the fat's scatter, that a labelled voxel differs at least; >= 0
+  double gap_mm = 2.5;          ///< gaps narrower than twice this are gland too, as a reader outlines it; >= 0
+  double failed_share = 1.6;    ///< bright: where fat is brighter than so many times its median, suppression failed
 };
 
 /// What find_gland was given besides the greys; masks of the image's grid.
@@ -48,12 +50,12 @@ struct GlandResult {
 /// Finds the gland in a breast whose fat has the grey 100, roughly.
 ///
 /// 1. Shading: the logarithm of the fat's grey as B-splines, coarse to fine, fitted to the voxels weighted by how
-/// likely
-///    they are fat; it begins with the fat under the skin, which every breast has.
+///    likely they are fat; it begins with the fat under the skin, which every breast has. Beyond fat, on the side where
+///    no gland is, all is fat.
 /// 2. Classes with neighbourhood (classify_gland); the share of gland in each voxel is its contrast over that of pure
 ///    gland.
 /// 3. Place: not in skin, chest or failed suppression; inside the fan from the nipple to the chest; no small islands.
-/// 4. Labelled is what is gland by least_share or more, in pieces that hold together over voxels with less.
+/// 4. Labelled is what a reader outlines around it (outline_gland); the share is not that of the filled gaps.
 /// @throws InputError  when the breast has too few voxels to fit
 GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const GlandOptions& options);
 

@@ -30,6 +30,10 @@ bool in_fan(const Fan& fan, const Eigen::Vector3d& p, double least_cosine) {
   return fan.there && way.dot(fan.inward) >= least_cosine * way.norm();
 }
 
+bool near_nipple(const Fan& fan, const Eigen::Vector3d& p) {
+  return fan.there && (p - fan.nipple_mm).norm() < near_nipple_mm;
+}
+
 }  // namespace
 
 Depths measure_depths(const GlandPlace& place, const Grid& grid) {
@@ -70,26 +74,31 @@ std::array<Fan, 2> find_fans(const GlandPlace& place, const Grid& grid) {
   return fans;
 }
 
+Mask where_gland_may_lie(const Mask& within, const GlandPlace& place, const Depths& depths, const Grid& grid,
+                         const GlandOptions& options) {
+  const std::array<Fan, 2> fans = find_fans(place, grid);
+  const double least_cosine = std::cos(options.fan_deg * std::numbers::pi / 180);
+  Mask may(within.size(), 0);
+  for_each(within, grid, [&](std::size_t n, const Eigen::Vector3d& p) {
+    const Fan& fan = fans[p.x() > place.sternum_x_mm ? 1 : 0];
+    may[n] = p.y() < place.back_y_mm && in_fan(fan, p, least_cosine) &&
+             (near_nipple(fan, p) || depths.skin_mm[n] > options.superficial_mm);
+  });
+  return may;
+}
+
 Mask where_gland_lies(const Mask& looks, const GlandPlace& place, const Depths& depths, const Grid& grid,
                       const GlandOptions& options) {
   const std::array<Fan, 2> fans = find_fans(place, grid);
-  const double least_cosine = std::cos(options.fan_deg * std::numbers::pi / 180);
-  Mask lies(looks.size(), 0), near(looks.size(), 0);
-  for_each(looks, grid, [&](std::size_t n, const Eigen::Vector3d& p) {
-    const Fan& fan = fans[p.x() > place.sternum_x_mm ? 1 : 0];
-    near[n] = fan.there && (p - fan.nipple_mm).norm() < near_nipple_mm;
-    lies[n] = p.y() < place.back_y_mm && in_fan(fan, p, least_cosine) &&
-              (near[n] || depths.skin_mm[n] > options.superficial_mm);
-  });
+  Mask lies = where_gland_may_lie(looks, place, depths, grid, options);
   const Components pieces =
       connected_components(options.bridge_mm > 0 ? dilate(lies, grid, options.bridge_mm / 2) : lies, grid);
   std::vector<double> voxels(pieces.size.size() + 1, 0), deep(voxels), at_nipple(voxels);
-  for (std::size_t n = 0; n < lies.size(); ++n) {
-    if (!lies[n]) continue;
+  for_each(lies, grid, [&](std::size_t n, const Eigen::Vector3d& p) {
     ++voxels[pieces.number[n]];
     deep[pieces.number[n]] += depths.skin_mm[n] > least_depth_mm;
-    at_nipple[pieces.number[n]] += near[n];
-  }
+    at_nipple[pieces.number[n]] += near_nipple(fans[p.x() > place.sternum_x_mm ? 1 : 0], p);
+  });
   const double least = options.least_ml * 1000 / grid.voxel_volume_mm3();
   for (std::size_t n = 0; n < lies.size(); ++n) {
     const std::int32_t piece = pieces.number[n];

@@ -24,8 +24,11 @@ struct Fan {
 /// Of the right (0) and the left (1) breast.
 std::array<Fan, 2> find_fans(const GlandPlace& place, const Grid& grid);
 
-/// Of what looks like gland, what lies where gland does: in a breast's fan, not too far back, in pieces that are large
-/// enough, and either deep or near the nipple.
+/// Those voxels of a mask where gland may lie: in a breast's fan, not too far back, and either deep or near the nipple.
+Mask where_gland_may_lie(const Mask& within, const GlandPlace& place, const Depths& depths, const Grid& grid,
+                         const GlandOptions& options);
+
+/// Of what looks like gland and may be, the pieces that are large enough and either deep or at the nipple.
 Mask where_gland_lies(const Mask& looks, const GlandPlace& place, const Depths& depths, const Grid& grid,
                       const GlandOptions& options);
 

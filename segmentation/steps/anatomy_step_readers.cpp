@@ -90,6 +90,8 @@ Step read_gland(const StepTable& table) {
   o.bridge_mm = table.number("bridge_mm", not_negative).value_or(o.bridge_mm);
   o.least_ml = table.number("least_ml", not_negative).value_or(o.least_ml);
   o.least_share = table.number("least_share", {.lower = 0, .upper = 0.99}).value_or(o.least_share);
+  o.least_deviations = table.number("least_deviations", not_negative).value_or(o.least_deviations);
+  o.gap_mm = table.number("gap_mm", not_negative).value_or(o.gap_mm);
   o.failed_share = table.number("failed_share", {.lower = 1.1}).value_or(o.failed_share);
   return step;
 }

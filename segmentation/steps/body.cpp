@@ -101,7 +101,10 @@ Mask find_body(const GreyImage& image, const Body& wanted) {
         fmt::format("no grey reaches lower = {}; the volume holds no body, or the level is too high", step.lower));
   Mask air = find_air(image, step, dark);
   if (std::find(air.begin(), air.end(), 1) == air.end())
-    throw InputError(fmt::format("no air (greys below lower = {}) is found at the front of the image", step.lower));
+    throw InputError(
+        fmt::format("no air (greys below lower = {:.4g}) is found at the front of the image: is it inverted, of "
+                    "another kind (noise as bright as suppressed fat), or filled by the body?",
+                    step.lower));
   Mask body = keep_islands(complement(air), grid, 1, 0);
   if (step.open_mm > 0) {
     // Only what stands out of the opened body goes: opening as such would round off the body's own corners.

@@ -22,6 +22,7 @@ namespace supine::segmentation {
 namespace {
 
 constexpr double outlier_sd = 2.5;
+constexpr std::size_t most_samples = 1'500'000;
 constexpr int fit_rounds = 8;
 constexpr int reselections = 3;
 constexpr double nearest_share = 0.7;  // of the fat's grey; muscle and gland lie below
@@ -110,8 +111,8 @@ Eigen::VectorXd fit(const Polynomial& polynomial, std::vector<Sample>& samples) 
   return coefficients;
 }
 
-/// Drops samples beyond outlier_sd robust standard deviations of the used ones.
-void drop_outliers(std::vector<Sample>& samples) {
+/// Drops samples beyond outlier_sd robust standard deviations of the used ones. @return that bound
+double drop_outliers(std::vector<Sample>& samples) {
   std::vector<double> sizes;
   for (const Sample& s : samples)
     if (s.used) sizes.push_back(std::abs(s.residual));
@@ -119,20 +120,35 @@ void drop_outliers(std::vector<Sample>& samples) {
   std::nth_element(sizes.begin(), middle, sizes.end());
   const double bound = outlier_sd * 1.4826 * *middle;  // 1.4826: median absolute deviation to sd of a normal law
   for (Sample& s : samples) s.used = std::abs(s.residual) <= bound;
+  return bound;
 }
 
+/// Of many samples every n-th is fitted: a polynomial of a few terms is not known better by more.
 Eigen::VectorXd settle(const Polynomial& polynomial, std::vector<Sample>& samples) {
-  Eigen::VectorXd coefficients = fit(polynomial, samples);
+  const std::size_t stride = samples.size() / most_samples + 1;
+  std::vector<Sample> few;
+  if (stride > 1)
+    for (std::size_t n = 0; n < samples.size(); n += stride) few.push_back(samples[n]);
+  std::vector<Sample>& fitted = stride > 1 ? few : samples;
+  Eigen::VectorXd coefficients = fit(polynomial, fitted);
+  double bound = 0;
   for (int round = 1; round < fit_rounds; ++round) {
-    drop_outliers(samples);
-    coefficients = fit(polynomial, samples);
+    bound = drop_outliers(fitted);
+    coefficients = fit(polynomial, fitted);
+  }
+  if (stride == 1) return coefficients;
+  Eigen::VectorXd row(polynomial.terms());
+  for (Sample& s : samples) {
+    polynomial.evaluate(s.i, s.j, s.k, row);
+    s.residual = s.log_grey - row.dot(coefficients);
+    s.used = std::abs(s.residual) <= bound;
   }
   return coefficients;
 }
 
-/// The voxels whose grey, freed of the shading found so far, is near that of the tissue.
-std::vector<Sample> reselect(const GreyImage& image, const Polynomial& polynomial,
-                             const Eigen::VectorXd& coefficients) {
+/// The voxels, every n-th of them, whose grey, freed of the shading found so far, is near that of the tissue.
+std::vector<Sample> reselect(const GreyImage& image, const Polynomial& polynomial, const Eigen::VectorXd& coefficients,
+                             int stride) {
   std::vector<Sample> samples;
   const Grid& grid = image.grid;
   Eigen::VectorXd row(coefficients.size());
@@ -140,7 +156,7 @@ std::vector<Sample> reselect(const GreyImage& image, const Polynomial& polynomia
     for (int j = 0; j < grid.size.y(); ++j)
       for (int i = 0; i < grid.size.x(); ++i) {
         const double grey = image.at(i, j, k);
-        if (grey <= 0) continue;
+        if (grey <= 0 || (i + 7 * j + 11 * k) % stride != 0) continue;
         polynomial.evaluate(i, j, k, row);
         const double share = grey / std::exp(row.dot(coefficients));
         if (share > nearest_share && share < 1 / nearest_share) samples.push_back({i, j, k, std::log(grey), 0, true});
@@ -213,8 +229,10 @@ BiasFit correct_bias(GreyImage& image, const Bias& step, const Mask& within) {
   Eigen::VectorXd coefficients = settle(polynomial, samples);
   if (is_automatic(
           step)) {  // the first range is one grey for the whole volume: now take the tissue where it is dark too
+    const int stride = static_cast<int>(samples.size() / most_samples) + 1;
     for (int round = 0; round < reselections; ++round) {
-      samples = reselect(image, polynomial, coefficients);
+      const bool last = round + 1 == reselections;  // whose samples the local mean takes
+      samples = reselect(image, polynomial, coefficients, last ? 1 : stride);
       coefficients = settle(polynomial, samples);
     }
   }

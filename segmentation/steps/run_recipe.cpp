@@ -297,14 +297,16 @@ void Recipe::set_side(Planes::Side side) {
 
 namespace {
 
-/// Where the image shows no border between breast and muscle, in front of the model's back.
+/// Where the image shows no border between breast and muscle, or two that do not fit, in front of the model's back.
 std::vector<Doubt> doubts_of_wall(const RecipeResult& result) {
   double back_mm = std::numeric_limits<double>::infinity();
   for (const CutPlane& plane : result.planes)
     if (plane.name == "mid_axillary") back_mm = plane.at_mm;
   std::vector<Doubt> doubts;
-  for (const ChestWall& wall : result.walls)
+  for (const ChestWall& wall : result.walls) {
     for (const Leak& leak : find_leaks(wall, back_mm)) doubts.push_back({describe(leak), leak.middle_mm});
+    for (const Leak& patch : find_uneven(wall, back_mm)) doubts.push_back({describe_uneven(patch), patch.middle_mm});
+  }
   return doubts;
 }
 

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "segmentation/gland/bspline_field.h"
+#include "segmentation/gland/gland_outline.h"
 #include "segmentation/gland/tissue_classes.h"
 
 namespace supine::segmentation {
@@ -132,6 +133,89 @@ TEST(Gland, LabelsWhatIsMostlyGlandAndKeepsTheShareOfTheRest) {
   options.least_share = 0;  // then what holds any gland is labelled
   const GlandResult any = find_gland(image, place, options);
   EXPECT_GT(std::count(any.gland.begin(), any.gland.end(), 1), 0.9 * (core + shell_voxels));
+}
+
+/// A slab of fat on one grid, whose contrast the tests draw.
+struct Slab {
+  Grid grid = cube(40, 1);
+  FatLevel fat;
+  Mask possible, sure;
+  GlandOptions options;
+  Slab() {
+    fat.contrast.assign(grid.count(), 0);
+    fat.deviation.assign(grid.count(), 0.03f);
+    possible.assign(grid.count(), 1);
+    sure.assign(grid.count(), 0);
+    options.gap_mm = 0;
+  }
+  void draw(Eigen::Vector3i from, Eigen::Vector3i to, float contrast, bool is_sure) {
+    for (int k = from.z(); k < to.z(); ++k)
+      for (int j = from.y(); j < to.y(); ++j)
+        for (int i = from.x(); i < to.x(); ++i) {
+          fat.contrast[grid.index(i, j, k)] = contrast;
+          sure[grid.index(i, j, k)] = is_sure;
+        }
+  }
+  bool labelled(int i, int j, int k) const {
+    return outline_gland(sure, possible, fat, grid, options)[grid.index(i, j, k)];
+  }
+};
+
+TEST(GlandOutline, AStrandIsFollowedAsFarAsItShowsHalfOfWhatGlandShowsThere) {
+  Slab slab;
+  slab.draw({18, 5, 18}, {22, 20, 22}, 0.25f, true);    // a strand, thinner than its voxels: a quarter is gland
+  slab.draw({18, 20, 18}, {22, 32, 22}, 0.14f, false);  // fades
+  EXPECT_TRUE(slab.labelled(20, 10, 20));
+  EXPECT_TRUE(slab.labelled(20, 27, 20));
+  EXPECT_FALSE(slab.labelled(20, 36, 20));
+  slab.draw({18, 5, 18}, {22, 20, 22}, 0.6f, true);  // beside solid gland the same grey is its rim, not a strand
+  EXPECT_FALSE(slab.labelled(20, 24, 20));
+}
+
+TEST(GlandOutline, WhatHangsOnNothingSureIsNotGland) {
+  Slab slab;
+  slab.draw({18, 5, 18}, {22, 15, 22}, 0.25f, true);
+  slab.draw({18, 22, 18}, {22, 28, 22}, 0.25f, false);
+  EXPECT_FALSE(slab.labelled(20, 25, 20));
+}
+
+TEST(GlandOutline, NarrowGapsAreFilledAsAReaderDoes) {
+  Slab slab;
+  slab.draw({16, 5, 10}, {18, 35, 30}, 0.5f, true);
+  slab.draw({21, 5, 10}, {23, 35, 30}, 0.5f, true);
+  EXPECT_FALSE(slab.labelled(19, 20, 20));
+  slab.options.gap_mm = 2.5;
+  EXPECT_TRUE(slab.labelled(19, 20, 20));
+  EXPECT_FALSE(slab.labelled(27, 20, 20));
+}
+
+/// Beside a coil the shading is steep: fat is twice as bright there as 30 mm farther in.
+TEST(FatLevel, FollowsTheSteepShadingBesideACoil) {
+  const Grid grid = cube(56, 2);
+  GreyImage image{grid, {}};
+  Mask inner, under_skin, beside;
+  std::mt19937 random(2);
+  std::normal_distribution<float> noise(0, 3);
+  for (int k = 0; k < 56; ++k)
+    for (int j = 0; j < 56; ++j)
+      for (int i = 0; i < 56; ++i) {
+        const double radius = std::hypot(i - 28, k - 28), from_coil = 2 * std::hypot(i - 54, j - 24, k - 28);
+        const bool gland = std::hypot(i - 20, j - 24, k - 28) < 5;
+        inner.push_back(radius < 23 && j > 4);
+        under_skin.push_back(inner.back() && radius > 18);
+        beside.push_back(inner.back() && from_coil < 24);
+        image.voxels.push_back(static_cast<float>((gland ? 40 : 100) * (1 + 2 * std::exp(-from_coil / 12))) +
+                               noise(random));
+      }
+  const FatLevel fat = find_fat_level(image, inner, under_skin, {});
+  double sum = 0, count = 0;
+  for (std::size_t n = 0; n < beside.size(); ++n)
+    if (beside[n]) {
+      sum += fat.contrast[n];
+      ++count;
+    }
+  EXPECT_NEAR(sum / count, 0, 0.05);
+  EXPECT_NEAR(fat.contrast[grid.index(20, 24, 28)], 0.6, 0.06);
 }
 
 }  // namespace

@@ -181,6 +181,40 @@ TEST(AutomaticT1, DenseGlandIsNotTakenForTheChest) {
   EXPECT_GT(worst(0), 15);
 }
 
+/// How far in front of the chest a point lies, nearly, mm.
+double ahead_of_chest(const Eigen::Vector3d& p) { return (std::sqrt(chest(p)) - 1) * half_depth; }
+
+/// Fat and muscle equally bright with a thin dark line between; on her left another line in the fat in its place.
+TEST(AutomaticFatSuppressed, ALineOnOneSideAloneIsNotTheChest) {
+  GreyImage image = torso(0);
+  Mask body;
+  std::mt19937 random(4);
+  std::normal_distribution<float> noise(0, 3);
+  for (int k = 0; k < image.grid.size.z(); ++k)
+    for (int j = 0; j < image.grid.size.y(); ++j)
+      for (int i = 0; i < image.grid.size.x(); ++i) {
+        const Eigen::Vector3d p = image.grid.point(Eigen::Vector3d(i, j, k));
+        const double ahead = ahead_of_chest(p);
+        const bool inside = ahead < 0 || in_body(p);
+        const bool elsewhere = p.x() > 25 && p.x() < 95 && p.z() > -20;
+        const bool line = std::abs(elsewhere ? ahead - 16 : ahead) < 1.6;
+        body.push_back(inside);
+        const float grey = !inside ? 0 : line ? 60 : 100;
+        image.at(i, j, k) = std::abs(grey + noise(random));
+      }
+  ChestWallOptions options;
+  for (const Step& step : recipe("fatsat_auto.toml").steps)
+    if (const auto* chest_step = std::get_if<Chest>(&step)) options = chest_step->options;
+  const ChestWall wall = find_chest_wall(image, body, find_torso(front_skin(body, image.grid)), options);
+  double worst = 0;
+  for (Eigen::Index k = 0; k < wall.radius_mm.cols(); ++k)
+    for (Eigen::Index a = 0; a < wall.radius_mm.rows(); ++a) {
+      const Eigen::Vector3d p = wall.point(a, k);
+      if (p.x() > 30 && p.x() < 85 && std::abs(p.z()) < 45 && p.y() < 70) worst = std::max(worst, ahead_of_chest(p));
+    }
+  EXPECT_LT(worst, 5);
+}
+
 TEST(AutomaticT1, TheCasesSideHoldsWhereTheRecipeNamesNone) {
   Recipe left = read_shipped_recipe("t1_auto");
   left.set_side(Planes::Side::left);

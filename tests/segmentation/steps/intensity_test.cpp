@@ -63,6 +63,25 @@ TEST(Intensity, BiasOfItsOwnDegreeIsRemovedExactly) {
   EXPECT_NEAR(image.at(5, 5, 5), 300.0 / 7, 1e-3);
 }
 
+/// More voxels than are fitted: the fit tells of them all, and their outliers are no tissue either.
+TEST(Intensity, BiasOfALargeVolumeIsThatOfAllItsVoxels) {
+  constexpr int size = 130;
+  GreyImage image = uniform(size, 0);
+  std::size_t others = 0;
+  for (int k = 0; k < size; ++k)
+    for (int j = 0; j < size; ++j)
+      for (int i = 0; i < size; ++i) {
+        const bool other = i > 40 && i < 50 && j > 40 && j < 50;
+        others += other;
+        image.at(i, j, k) = static_cast<float>((other ? 900 : 700) * std::exp(0.006 * i - 0.004 * k));
+      }
+  const BiasFit fit = correct_bias(image, {{1, INFINITY}, 2, 100});
+  const auto tissue = static_cast<double>(image.voxels.size() - others);
+  EXPECT_NEAR(static_cast<double>(fit.voxels), tissue, 0.01 * tissue);
+  EXPECT_NEAR(image.at(0, 0, 0), 100, 0.1);
+  EXPECT_NEAR(image.at(size - 1, size - 1, size - 1), 100, 0.1);
+}
+
 TEST(Intensity, BiasIsNotCarriedBeyondWhatTheTissueShows) {
   GreyImage image = uniform(30, 5);  // air
   for (int k = 0; k < 30; ++k)
