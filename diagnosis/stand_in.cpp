@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "calibration/work_limit.h"
 #include "common/error.h"
 #include "common/first_failure.h"
 #include "common/statistics.h"
@@ -62,7 +63,11 @@ class Imitation {
     const double along_lines = left_of(metric_.whitening->apply(change), slope_);
     if (!expected && !settles(along_lines, 1)) return nullptr;
     calibration::Evaluator evaluator(scene_, there.base(), accurate_enough());
-    WeightedFit fit = weigh(evaluator, there, metric_, start_of(there), &base_.fit.prediction.solution);
+    WeightedFit fit;
+    {
+      const calibration::TrialLimit limit(evaluator.chain(), base_.dearest);
+      fit = weigh(evaluator, there, metric_, start_of(there), &base_.fit.prediction.solution);
+    }
     if (!expected &&
         left_of(white(fit), metric_.whitening->apply(fit.solution.linearisation.slope)) > lines_agree * along_lines)
       return nullptr;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/work_limit.h"
 #include "common/error.h"
 
 namespace supine::diagnosis {
@@ -121,6 +122,7 @@ WeightedFit weigh(Evaluator& evaluator, const FreeParameters& parameters, const 
 void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
              const DescentOptions& options, WeightedFit& fit) {
   double damping = Damping::first;
+  int dearest = 0;
   fit.converged = false;
   for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
     const Rows rows = rows_of(fit.solution, parameters, metric);
@@ -133,7 +135,9 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metri
     const simulation::ChainSolution near =
         calibration::extrapolated(fit.solution.prediction.solution, fit.solution.linearisation.by_coordinate, step);
     ++fit.evaluations;
+    dearest = std::max(dearest, fit.solution.prediction.solution.work);
     try {
+      const calibration::TrialLimit limit(evaluator.chain(), dearest);
       WeightedFit trial = predicted(evaluator, parameters, metric, fit.solution.u + step, &near);
       if (trial.objective < fit.objective) {
         add_slopes(evaluator, parameters, trial);
@@ -144,7 +148,7 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metri
         continue;
       }
     } catch (const NumericalFailure&) {
-      // No equilibrium there: a shorter step.
+      // No equilibrium there, or none that costs as little: a shorter step.
     }
     damping = std::max(Damping::after_failure * damping, Damping::least_after_failure);
     if (damping > Damping::given_up) return;

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 
+#include "calibration/work_limit.h"
 #include "common/error.h"
 #include "common/first_failure.h"
 #include "diagnosis/weighted_fit.h"
@@ -192,6 +193,7 @@ std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, c
 
 void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& at,
                   std::vector<Candidate>& candidates, bool keep_shapes) {
+  const int dearest = std::max(base.dearest, at.dearest);
   const auto find_secant = [&](std::size_t c) {
     const auto& rows = candidates[c].parameters;
     const simulation::Parameter* row = simulation::find_parameter(rows[0].name);
@@ -203,6 +205,7 @@ void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, 
     model.effects.back().parameters[row->name].value = row->null + rest;
     try {
       calibration::Evaluator evaluator(scene, model, accurate_enough());
+      const calibration::TrialLimit limit(evaluator.chain(), dearest);
       calibration::Prediction moved = evaluator.predict(model, &at.fit.prediction.solution);
       const auto there = calibration::residuals_of(scene, moved, at.fit.mask, base.noise_mm);
       candidates[c].secant = (usual / rest) * (there.distance_mm - at.fit.residuals.distance_mm);
@@ -210,7 +213,7 @@ void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, 
       if (keep_shapes)
         candidates[c].secant_at = std::make_shared<const simulation::ChainSolution>(std::move(moved.solution));
     } catch (const NumericalFailure&) {
-      // No equilibrium at the usual size: the slope at the null has to do.
+      // No equilibrium at the usual size, or none that costs as little: the slope at the null has to do.
     }
   };
   FirstFailure failure;

@@ -94,6 +94,9 @@ void JointFitter::predict(const JointTrial& at, const simulation::ChainSolution*
     solve_first(evaluator_, poses_, at, near, ground_, fit_);
   else
     solve(evaluator_, poses_, at, near, ground_, fit_);
+  if (!first) return;
+  fit_.dearest = std::max(fit_.dearest, fit_.fit.prediction.solution.work);
+  if (near != nullptr) fit_.dearest = std::max(fit_.dearest, near->work);
 }
 
 std::unique_ptr<simulation::Sensitivities> JointFitter::linearise() {
@@ -124,7 +127,7 @@ bool JointFitter::improve() {
   const double promised = before - objective_of(y + evidence.directions().columns * step, stepped(step));
   if (promised < settled) return false;
   const calibration::Fit kept = fit_.fit;
-  dearest_ = std::max(dearest_, kept.prediction.solution.work);
+  fit_.dearest = std::max(fit_.dearest, kept.prediction.solution.work);
   const simulation::Model kept_model = fit_.model;
   for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
     fit_.fit.u = kept.u, fit_.nuisances = now.nuisances;
@@ -132,7 +135,7 @@ bool JointFitter::improve() {
     const simulation::ChainSolution near =
         calibration::extrapolated(kept.prediction.solution, kept.linearisation.by_coordinate, trial.u - kept.u);
     try {
-      const calibration::TrialLimit limit(evaluator_.chain(), dearest_);
+      const calibration::TrialLimit limit(evaluator_.chain(), fit_.dearest);
       predict(trial, &near);
       if (objective() < before) return true;
     } catch (const NumericalFailure&) {

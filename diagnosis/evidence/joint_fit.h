@@ -22,6 +22,7 @@ struct JointFit {
   std::vector<Nuisance> nuisances;                        ///< at the optimum
   double size_mm = 0;                                     ///< s of the discrepancy that is likeliest
   int evaluations = 0;
+  int dearest = 0;  ///< work of the dearest solution that was of use (ChainSolution::work)
 };
 
 /// Where a step would lead: coordinates of the free parameters, and nuisances at their values.
@@ -62,7 +63,6 @@ class JointFitter {
   JointFit& fit_;
   const BaseFit& ground_;
   std::vector<std::string> poses_;
-  int dearest_ = 0;  // work of the dearest prediction that was of use
 };
 
 }  // namespace supine::diagnosis
