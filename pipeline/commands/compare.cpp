@@ -105,7 +105,7 @@ class CompareTool : public Tool {
       draw_distances(run.output(skin_file),
                      fmt::format("{}, {}: RMS {:.2f} mm, mean {:.2f} mm", inputs.measured.name, inputs.pose.name,
                                  comparison.scan.rms_mm, comparison.scan.mae_mm),
-                     inputs.measured.side, run.output(png_));
+                     inputs.measured.side, run.output(png_), run.output(scan_file));
     say(run, inputs.pose, comparison, landmarks);
     if (agreement) say_agreement(run, *agreement);
     doubt(run, inputs, comparison);

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <vtkActor.h>
 #include <vtkBillboardTextActor3D.h>
+#include <vtkBoundingBox.h>
+#include <vtkCellArray.h>
 #include <vtkColorTransferFunction.h>
 #include <vtkDoubleArray.h>
 #include <vtkNew.h>
@@ -57,10 +59,27 @@ void blank_uncovered(vtkPolyData& skin) {
   skin.GetPointData()->AddArray(shown);
 }
 
-std::vector<double> sizes_of(vtkPolyData& skin) {
+/// The points of a scan, whatever it is made of, with what they show.
+vtkSmartPointer<vtkPolyData> read_scan(const fs::path& file) {
+  auto scan = vtkSmartPointer<vtkPolyData>::New();
+  scan->ShallowCopy(read_vtp(file));
+  vtkDataArray* distance = scan->GetPointData()->GetArray("distance_mm");
+  if (distance == nullptr) throw InputError(file.string() + " has no points with distance_mm to draw");
+  vtkNew<vtkDoubleArray> shown;
+  shown->DeepCopy(distance);
+  shown->SetName("shown");
+  scan->GetPointData()->AddArray(shown);
+  vtkNew<vtkCellArray> points;
+  for (vtkIdType p = 0; p < scan->GetNumberOfPoints(); ++p) points->InsertNextCell({p});
+  scan->SetPolys(nullptr);
+  scan->SetVerts(points);
+  return scan;
+}
+
+std::vector<double> sizes_of(vtkPolyData& data) {
   std::vector<double> sizes;
-  vtkDataArray* shown = skin.GetPointData()->GetArray("shown");
-  for (vtkIdType p = 0; p < skin.GetNumberOfPoints(); ++p)
+  vtkDataArray* shown = data.GetPointData()->GetArray("shown");
+  for (vtkIdType p = 0; p < data.GetNumberOfPoints(); ++p)
     if (const double d = shown->GetTuple1(p); std::isfinite(d)) sizes.push_back(std::abs(d));
   std::sort(sizes.begin(), sizes.end());
   return sizes;
@@ -128,7 +147,7 @@ void draw_mark(vtkRenderer& pane, const Mark& mark, const View& view) {
   pane.AddActor(text);
 }
 
-void draw_legend(vtkRenderer& pane, vtkColorTransferFunction* colours) {
+void draw_legend(vtkRenderer& pane, vtkColorTransferFunction* colours, bool points) {
   vtkNew<vtkScalarBarActor> bar;
   bar->SetLookupTable(colours);
   bar->SetNumberOfLabels(5);
@@ -147,12 +166,13 @@ void draw_legend(vtkRenderer& pane, vtkColorTransferFunction* colours) {
   constexpr TextStyle small = {.size = text_size - 3};
   write_text(pane, "+ scan outside", 0.5, 0.87, small);
   write_text(pane, "- scan inside", 0.5, 0.15, small);
-  write_text(pane, "grey: not covered", 0.5, 0.08, small);
+  write_text(pane, points ? "points of the scan" : "grey: not covered", 0.5, 0.08, small);
 }
 
-void add_skin(vtkRenderer& pane, vtkPolyData* skin, vtkColorTransferFunction* colours) {
+/// @param opacity  under 1: what lies in it is seen
+void add_coloured(vtkRenderer& pane, vtkPolyData* data, vtkColorTransferFunction* colours, double opacity) {
   vtkNew<vtkPolyDataMapper> mapper;
-  mapper->SetInputData(skin);
+  mapper->SetInputData(data);
   mapper->SetScalarModeToUsePointFieldData();
   mapper->SelectColorArray("shown");
   mapper->SetLookupTable(colours);
@@ -163,6 +183,8 @@ void add_skin(vtkRenderer& pane, vtkPolyData* skin, vtkColorTransferFunction* co
   actor->GetProperty()->SetAmbient(0.6);
   actor->GetProperty()->SetDiffuse(0.45);
   actor->GetProperty()->SetSpecular(0);
+  actor->GetProperty()->SetOpacity(opacity);
+  actor->GetProperty()->SetPointSize(4);
   pane.AddActor(actor);
 }
 
@@ -192,13 +214,22 @@ const View* best_view(const Mark& mark, const std::vector<const View*>& views) {
 
 }  // namespace
 
-void draw_distances(const fs::path& file, const std::string& title, const std::string& side, const fs::path& png) {
+void draw_distances(const fs::path& file, const std::string& title, const std::string& side, const fs::path& png,
+                    const fs::path& scan_file) {
+  constexpr double see_through = 0.25;
   const auto skin = read_skin(file);
   blank_uncovered(*skin);
-  const auto colours = diverging(colour_range_mm(sizes_of(*skin)));
+  vtkSmartPointer<vtkPolyData> scan;
+  if (sizes_of(*skin).empty() && !scan_file.empty()) scan = read_scan(scan_file);
+  const auto colours = diverging(colour_range_mm(sizes_of(scan != nullptr ? *scan : *skin)));
   const auto marks = hot_spots(*skin);
   double bounds[6];
   skin->GetBounds(bounds);
+  if (scan != nullptr) {
+    vtkBoundingBox both(bounds);
+    both.AddBounds(scan->GetBounds());
+    both.GetBounds(bounds);
+  }
   const View flat = object_view(bounds, false), edge = object_view(bounds, true);
   const std::vector<const View*> views = side == "none" ? std::vector<const View*>{&flat, &edge} : views_of(side);
   const std::vector<double> shares =
@@ -208,13 +239,14 @@ void draw_distances(const fs::path& file, const std::string& title, const std::s
   for (std::size_t v = 0; v < views.size(); ++v) {
     vtkRenderer& pane = sheet.pane(from, 0, from + shares[v], 0.93);
     from += shares[v];
-    add_skin(pane, skin, colours);
+    add_coloured(pane, skin, colours, scan != nullptr ? see_through : 1);
+    if (scan != nullptr) add_coloured(pane, scan, colours, 1);
     for (const Mark& mark : marks)
       if (best_view(mark, views) == views[v]) draw_mark(pane, mark, *views[v]);
     look(pane, *views[v], bounds);
     scale_line(pane);
   }
-  draw_legend(sheet.pane(panes_share, 0, 1, 0.93), colours);
+  draw_legend(sheet.pane(panes_share, 0, 1, 0.93), colours, scan != nullptr);
   sheet.write(png);
 }
 

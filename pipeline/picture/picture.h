@@ -28,9 +28,11 @@ void announce_png(Run& run, const std::filesystem::path& file, const std::filesy
 /// @param file   of calibration::write_comparison() or diagnosis::write_error_map()
 /// @param title  above the picture
 /// @param side   left, right or both; none: an object, seen along the two short sides of its box
+/// @param scan   of calibration::write_scan(); where nothing of the skin is covered, as by a contour, its points are
+///   drawn in the skin's place, coloured alike, and the skin is see-through. Empty: none
 /// @throws InputError  no display, no such array, not writable
 void draw_distances(const std::filesystem::path& file, const std::string& title, const std::string& side,
-                    const std::filesystem::path& png);
+                    const std::filesystem::path& png, const std::filesystem::path& scan = {});
 
 /// The boundary of a tetrahedral mesh (.vtu) with its edges, coloured by `region`: from the front and from behind.
 /// @throws InputError  as above

@@ -3,11 +3,20 @@
 #include "pipeline/picture/picture.h"
 
 #include <gtest/gtest.h>
+#include <vtkDataArray.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPNGReader.h>
+#include <vtkPointData.h>
+#include <vtkPolyData.h>
+#include <vtkXMLPolyDataWriter.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "common/error.h"
+#include "common/vtk_files.h"
 #include "reconstruction/surface_io.h"
 #include "tests/pipeline/process.h"
 #include "tests/pipeline/small_run.h"
@@ -27,6 +36,21 @@ bool can_draw() { return run_process({"sh", "-c", "command -v Xvfb"}).code == 0;
 
 #define NEEDS_XVFB() \
   if (!can_draw()) GTEST_SKIP() << "Xvfb is not installed (apt-get install xvfb)"
+
+/// Of the pixels of a picture that are no shade of grey.
+double coloured_share(const fs::path& png) {
+  vtkNew<vtkPNGReader> reader;
+  reader->SetFileName(png.c_str());
+  reader->Update();
+  vtkDataArray* pixels = reader->GetOutput()->GetPointData()->GetScalars();
+  double coloured = 0;
+  for (vtkIdType p = 0; p < pixels->GetNumberOfTuples(); ++p) {
+    const double* c = pixels->GetTuple(p);
+    const auto [least, most] = std::minmax({c[0], c[1], c[2]});
+    coloured += most - least > 40;
+  }
+  return coloured / static_cast<double>(pixels->GetNumberOfTuples());
+}
 
 class Pictures : public testing::Test {
  protected:
@@ -86,6 +110,24 @@ TEST_F(Pictures, TheOuterSideIsThatOfTheBreastAndOfBothBreasts) {
   EXPECT_NE(drawn[0], drawn[1]);
   EXPECT_NE(drawn[0], drawn[2]);
   EXPECT_NE(drawn[1], drawn[2]);
+}
+
+TEST_F(Pictures, AScanThatCoversNothingIsDrawnItself) {
+  NEEDS_XVFB();
+  const fs::path scan = small_run() / "out/scan.vtp";
+  draw_distances(small_run() / "out/comparison.vtp", "the same title", "left", folder_ / "skin.png", scan);
+  draw_distances(small_run() / "out/comparison.vtp", "the same title", "left", folder_ / "alone.png");
+  EXPECT_EQ(read_text(folder_ / "skin.png"), read_text(folder_ / "alone.png"));
+
+  vtkSmartPointer<vtkPolyData> bare = read_vtp(small_run() / "out/comparison.vtp");
+  bare->GetPointData()->GetArray("covered")->Fill(0);
+  vtkNew<vtkXMLPolyDataWriter> writer;
+  writer->SetInputData(bare);
+  writer->SetFileName((folder_ / "bare.vtp").c_str());
+  writer->Write();
+  draw_distances(folder_ / "bare.vtp", "the same title", "left", folder_ / "scan.png", scan);
+  draw_distances(folder_ / "bare.vtp", "the same title", "left", folder_ / "grey.png");
+  EXPECT_GT(coloured_share(folder_ / "scan.png"), coloured_share(folder_ / "grey.png") + 0.02);
 }
 
 TEST_F(Pictures, APlacementShowsTheScanAsGivenAndAsFound) {
