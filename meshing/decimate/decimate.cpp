@@ -34,7 +34,7 @@ DecimateResult unchanged(const DecimateMeasure& measure, bool reached, std::stri
 
 std::string too_many(const DecimateResult& result, const DecimateOptions& options) {
   return fmt::format(
-      "{} triangles are needed to stay within {} mm of the input; allow more triangles or a larger distance",
+      "{} triangles are needed to stay within {:.3g} mm of the input; allow more triangles or a larger distance",
       result.surface.triangles.rows(), options.max_distance_mm);
 }
 

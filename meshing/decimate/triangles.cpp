@@ -18,18 +18,22 @@ using reconstruction::Surface;
 constexpr int most_levels = 3;       // edges down to 1/8 of the coarsest
 constexpr double start_share = 0.2;  // edges of what is remeshed again and again, of the coarsest
 constexpr int most_tries = 16;
+constexpr double shortest_share = 0.7;  // of the first edge length, below which no sound surface is looked for
 
-// Every place goes one level below the finest level that claims it already.
-void add_places(const std::vector<Eigen::Vector3d>& places, double edge_mm, std::vector<FinePlace>& fine) {
+// Every place goes one level below the finest level that claims it already. @return whether any is not at the finest
+bool add_places(const std::vector<Eigen::Vector3d>& places, double edge_mm, std::vector<FinePlace>& fine) {
   const std::size_t before = fine.size();
+  bool finer = false;
   for (const Eigen::Vector3d& at : thinned(places, edge_mm / 4)) {
     int level = 0;
     for (std::size_t i = 0; i < before; ++i)
       if ((fine[i].point_mm - at).norm() < 2 * edge_mm / std::exp2(fine[i].level))
         level = std::max(level, fine[i].level);
+    finer = finer || level < most_levels;
     // The coarser levels surround the finer ones, so that edges grow step by step.
     for (int l = 1; l <= std::min(level + 1, most_levels); ++l) fine.push_back({at, l});
   }
+  return finer;
 }
 
 // One remeshing at a given coarseness, refined until the bound holds. @return whether it is sound and within the bound
@@ -50,7 +54,7 @@ bool refine_to_bound(const DecimateMeasure& measure, const Surface& start, doubl
     result.reason =
         fmt::format("isotropic remeshing leaves the bound or crosses itself near ({:.1f}, {:.1f}, {:.1f}) mm",
                     places.front().x(), places.front().y(), places.front().z());
-    add_places(places, edge_mm, fine);
+    if (!add_places(places, edge_mm, fine)) return false;
   }
   return false;
 }
@@ -69,6 +73,7 @@ DecimateResult decimate_to_triangles(const DecimateMeasure& measure, const Decim
   }
   Surface start = in;
   const auto start_triangles = static_cast<Eigen::Index>(target / (start_share * start_share));
+  const double shortest_mm = shortest_share * edge_mm;
   if (in.triangles.rows() > 2 * start_triangles) start = remesh(in, start_share * edge_mm, {}, 1);
   DecimateResult best;
   for (int attempt = 0; attempt < most_tries; ++attempt) {
@@ -80,6 +85,7 @@ DecimateResult decimate_to_triangles(const DecimateMeasure& measure, const Decim
       edge_mm *= 0.8;
       if (best.surface.triangles.rows() > 0) break;
       best.reason = result.reason;
+      if (edge_mm < shortest_mm) break;
       continue;
     }
     const auto triangles = result.surface.triangles.rows();
