@@ -51,8 +51,8 @@ void add_voxel(const LabelImage& image, const Mask& thin, const Eigen::Vector3i&
 bool is_perforator(const Piece& piece, const Grid& grid, double thinnest_mm) {
   const Eigen::Vector3d size_mm =
       (piece.high - piece.low + Eigen::Vector3i::Ones()).cast<double>().cwiseProduct(grid.spacing_mm);
-  return size_mm.norm() > thinnest_mm && piece.other_faces == 0 &&
-         piece.muscle_faces > piece.excluded_faces && piece.muscle_faces > 2 * piece.tissue_faces;
+  return size_mm.norm() > thinnest_mm && piece.other_faces == 0 && piece.muscle_faces > piece.excluded_faces &&
+         piece.muscle_faces > 2 * piece.tissue_faces;
 }
 
 template <class Visit>
