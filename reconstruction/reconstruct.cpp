@@ -173,12 +173,15 @@ Reconstruction reconstruct(const LabelImage& image, const ReconstructOptions& op
   options.check();
   require_tissues(image);
   Reconstruction result;
-  LabelImage without_perforators = image;
-  const double perforator_volume_mm3 = turn_perforators_into_muscle(without_perforators, options.thinnest_mm);
-  VoxelSurface breast = voxel_surface(without_perforators, meshed_tissues(), options.smallest_piece_mm3);
-  breast.surface.region = regions_of(breast, without_perforators, options.cut);
-  result.breast = finish("breast", breast, without_perforators, options);
+  LabelImage body = image;
+  const double perforator_volume_mm3 = turn_perforators_into_muscle(body, options.thinnest_mm);
+  HandleRepair handles;
+  if (options.thinnest_mm > 0) handles = close_handles(body);
+  VoxelSurface breast = voxel_surface(body, meshed_tissues(), options.smallest_piece_mm3);
+  breast.surface.region = regions_of(breast, body, options.cut);
+  result.breast = finish("breast", breast, body, options);
   result.breast.perforator_volume_mm3 = perforator_volume_mm3;
+  result.breast.handles = std::move(handles);
   result.muscle = reversed_region(result.breast.surface, Region::inner);
   if (result.muscle.triangles.rows() == 0)
     throw InputError("no tissue to be meshed borders on the muscle; check the labels of muscle and of what lies on it");

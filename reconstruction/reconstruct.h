@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "reconstruction/handles.h"
 #include "reconstruction/regions.h"
 #include "reconstruction/surface_check.h"
 
@@ -16,7 +17,8 @@ struct ReconstructOptions {
   std::optional<double> smooth_mm;
   /// Loose bits of meshed tissue below this are left out of the breast: a solver cannot hold them.
   double smallest_piece_mm3 = 100;
-  /// Perforators (strands of tissue inside the muscle) that are thinner than this count as muscle.
+  /// Perforators (strands of tissue inside the muscle) that are thinner than this count as muscle. 0: neither they nor
+  /// handles (see close_handles()) are touched.
   double thinnest_mm = 3;
   /// An organ that would have more triangles is made from blocks of voxels; >= 1000.
   int most_organ_triangles = 300000;
@@ -34,6 +36,7 @@ struct OrganSurface {
   int dropped_pieces = 0;       ///< left out for their size (breast only)
   double dropped_volume_mm3 = 0;
   double perforator_volume_mm3 = 0;    ///< counted as muscle (breast only)
+  HandleRepair handles;                ///< what was done about them (breast only)
   double voxel_mm = 0;                 ///< largest side of the voxels the surface was made from
   std::size_t self_intersections = 0;  ///< counted on the surface; 0
   Eigen::Index less_smooth_points =

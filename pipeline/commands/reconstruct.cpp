@@ -53,9 +53,9 @@ class ReconstructTool : public Tool {
     app.add_option("--rim-mm", rim_mm_, "how far from the muscle bare tissue counts as its rim, mm, > 0");
     app.add_option("--smallest-piece-mm3", options_.smallest_piece_mm3,
                    "loose bits of tissue below this volume are left out, mm3, >= 0");
-    app.add_option(
-        "--thinnest-mm", options_.thinnest_mm,
-        "perforators (strands of tissue inside the muscle) thinner than this are counted as muscle, mm, >= 0");
+    app.add_option("--thinnest-mm", options_.thinnest_mm,
+                   "perforators (strands of tissue inside the muscle) thinner than this are counted as muscle, mm, >= "
+                   "0; 0 also leaves handles as thin as voxels");
   }
 
   Outcome run(Run& run) override {
@@ -180,6 +180,11 @@ class ReconstructTool : public Tool {
     json["dropped_pieces"] = organ.dropped_pieces;
     json["dropped_ml"] = organ.dropped_volume_mm3 / 1000;
     json["prongs_in_muscle_ml"] = organ.perforator_volume_mm3 / 1000;
+    if (organ.name == "breast")
+      json["handles"] = {{"found", organ.handles.genus_before},
+                         {"left", organ.handles.genus},
+                         {"filled_ml", organ.handles.filled_mm3 / 1000},
+                         {"removed_ml", organ.handles.removed_mm3 / 1000}};
     json["euler"] = report.euler;
     json["genus"] = report.genus();
     json["closed"] = report.closed();
@@ -201,6 +206,23 @@ class ReconstructTool : public Tool {
                           organ.report.region_area_mm2[static_cast<int>(region)] / 100));
   }
 
+  void warn_of_handles(Run& run, const reconstruction::HandleRepair& handles) const {
+    if (!handles.places_mm.empty()) {
+      const Eigen::Vector3d& at = handles.places_mm.front();
+      run.warn(
+          fmt::format("{} handle(s) as thin as voxels were closed, {:.2f} ml filled and {:.2f} ml taken away, the "
+                      "first at ({:.0f}, "
+                      "{:.0f}, {:.0f}) mm; the labels stay as they are",
+                      handles.genus_before - handles.genus, handles.filled_mm3 / 1000, handles.removed_mm3 / 1000,
+                      at.x(), at.y(), at.z()));
+    }
+    if (handles.genus > 0)
+      run.warn(
+          fmt::format("the {} has {} handle(s), tunnels or rings thicker than 4 voxels; if it should have none, "
+                      "look for them in the labels",
+                      body_word(), handles.genus));
+  }
+
   Outcome judge(Run& run, const Reconstruction& made) const {
     if (made.breast.dropped_pieces > 0)
       run.warn(fmt::format("{} loose bits of tissue were left out, {:.2f} ml together", made.breast.dropped_pieces,
@@ -208,6 +230,7 @@ class ReconstructTool : public Tool {
     if (made.breast.perforator_volume_mm3 > 0)
       run.warn(fmt::format("{:.2f} ml of thin tissue inside the {} were counted as {}",
                            made.breast.perforator_volume_mm3 / 1000, support_word(), support_word()));
+    warn_of_handles(run, made.breast.handles);
     if (made.breast.report.cavities > 0)
       run.warn(fmt::format("the {} encloses {} cavities of air, {} or excluded tissue", body_word(),
                            made.breast.report.cavities, support_word()));
