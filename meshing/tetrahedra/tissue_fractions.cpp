@@ -149,10 +149,11 @@ FractionReport assign_tissue(TetMesh& mesh, const LabelImage& labels, std::span<
   }
   FractionReport report;
   check_fit(mesh, outside, report);
-  report.voxel_ml = Eigen::VectorXd::Zero(segmentation::tissue_count);
-  for (const std::uint8_t tissue : labels.voxels) {
-    if (meshed(tissue)) report.voxel_ml[tissue] += labels.grid.voxel_volume_mm3() / 1000;
-  }
+  std::array<double, segmentation::tissue_count> voxels{};
+  for (std::size_t v = 0; v < labels.voxels.size(); ++v)
+    if (meshed(labels.voxels[v])) count_voxel(labels.voxels[v], gland_share.empty() ? NAN : gland_share[v], voxels);
+  report.voxel_ml = Eigen::Map<const Eigen::VectorXd>(voxels.data(), segmentation::tissue_count) *
+                    (labels.grid.voxel_volume_mm3() / 1000);
   return report;
 }
 

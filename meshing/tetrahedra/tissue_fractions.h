@@ -12,7 +12,9 @@ namespace supine::meshing {
 
 /// How the mesh and the labels fit.
 struct FractionReport {
-  Eigen::VectorXd voxel_ml;  ///< by segmentation::Tissue; meshed tissues only, the others 0
+  /// By segmentation::Tissue; meshed tissues only, the others 0; fat and gland by the share of gland where one is
+  /// given.
+  Eigen::VectorXd voxel_ml;
   double outside_share = 0;  ///< of the mesh's volume: further than the search radius from any meshed tissue
 };
 

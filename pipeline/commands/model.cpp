@@ -5,8 +5,12 @@
 
 #include "common/error.h"
 #include "common/outputs.h"
+#include "meshing/anatomy.h"
+#include "meshing/imaged_mesh.h"
+#include "pipeline/case/case.h"
 #include "pipeline/case/model_edit.h"
 #include "pipeline/case/model_file.h"
+#include "pipeline/case/starting_model.h"
 #include "pipeline/tool/tool.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
@@ -29,9 +33,14 @@ class ModelTool : public Tool {
   std::string name() const override { return "supine-model"; }
 
   std::string summary() const override {
-    return "Adds effects to a model file and removes them; shows what the file says and which effects there are.\n"
-           "add and remove change model.toml itself, comments kept, unless -o names another file.\n\n"
+    return "Makes a model file to begin with, adds effects and removes them; shows what the file says and which "
+           "effects "
+           "there are.\n"
+           "start writes CASE/model.toml, add and remove change model.toml itself, comments kept, unless -o names "
+           "another "
+           "file.\n\n"
            "Examples:\n"
+           "  supine-model start mycase mycase/out/mesh.vtu\n"
            "  supine-model list\n"
            "  supine-model show mycase/model.toml\n"
            "  supine-model add ligament mycase/model.toml\n"
@@ -39,23 +48,27 @@ class ModelTool : public Tool {
   }
 
   void declare(CLI::App& app) override {
-    app.add_option("action", action_, "list, show, add or remove")
+    app.add_option("action", action_, "start, list, show, add or remove")
         ->required()
-        ->check(CLI::IsMember({"list", "show", "add", "remove"}));
-    app.add_option("arguments", arguments_, "show: model.toml; add, remove: EFFECT model.toml")->expected(0, 2);
+        ->check(CLI::IsMember({"start", "list", "show", "add", "remove"}));
+    app.add_option("arguments", arguments_, "start: CASE mesh.vtu; show: model.toml; add, remove: EFFECT model.toml")
+        ->expected(0, 2);
   }
 
   Outcome run(Run& run) override {
     const std::size_t wanted = action_ == "list" ? 0 : action_ == "show" ? 1 : 2;
     if (arguments_.size() != wanted)
       throw InputError(fmt::format("{} takes {}", action_,
-                                   wanted == 0   ? "no further argument"
-                                   : wanted == 1 ? "a model file"
-                                                 : "an effect and a model file"));
+                                   wanted == 0          ? "no further argument"
+                                   : wanted == 1        ? "a model file"
+                                   : action_ == "start" ? "a case folder and its mesh"
+                                                        : "an effect and a model file"));
     if (action_ == "list")
       list(run);
     else if (action_ == "show")
       show(run);
+    else if (action_ == "start")
+      start(run);
     else
       edit(run);
     return Outcome::done;
@@ -105,6 +118,20 @@ class ModelTool : public Tool {
       for (const auto& [key, setting] : effect.parameters) say(key.c_str(), setting);
       for (const auto& [key, value] : effect.options) run.say(fmt::format("  {:<36}{}", key, value));
     }
+  }
+
+  void start(Run& run) {
+    const Case described = read_case(arguments_[0]);
+    if (described.is_object())
+      throw InputError(
+          fmt::format("{} is not a breast: state its moduli in model.toml (docs/model-file.md)", arguments_[0]));
+    const meshing::TetMesh mesh = meshing::read_imaged_mesh(run.input(arguments_[1]), described.side);
+    const double height_mm = meshing::compute_anatomy(mesh, described.side).mound_height_mm;
+    const fs::path target = output.empty() ? fs::path(arguments_[0]) / "model.toml" : output;
+    Outputs outputs(run.force());
+    std::ofstream(outputs.stage(target), std::ios::binary) << starting_model(height_mm);
+    outputs.commit();
+    run.say(fmt::format("{} fits a breast {:.0f} mm high", target.string(), height_mm));
   }
 
   void edit(Run& run) {

@@ -56,7 +56,9 @@ TEST(TissueFractions, AShareOfGlandCountsInsteadOfTheLabel) {
   auto mesh = testing::box_mesh(2, 2, 2, {20, 20, 20});
   const LabelImage labels = half_space(1, 10);
   const std::vector<float> share(labels.voxels.size(), 0.25f);
-  meshing::assign_tissue(mesh, labels, share);
+  const auto report = meshing::assign_tissue(mesh, labels, share);
+  EXPECT_NEAR(report.voxel_ml[gland], 2, 1e-6);
+  EXPECT_NEAR(report.voxel_ml[adipose], 6, 1e-6);
   for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
     EXPECT_NEAR(mesh.fraction(c, gland), 0.25, 1e-6);
     EXPECT_NEAR(mesh.fraction(c, adipose), 0.75, 1e-6);

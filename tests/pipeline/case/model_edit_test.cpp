@@ -3,7 +3,9 @@
 
 #include <cmath>
 
+#include "common/error.h"
 #include "pipeline/case/model_file.h"
+#include "pipeline/case/starting_model.h"
 #include "tests/pipeline/temporary_folder.h"
 
 namespace supine::pipeline {
@@ -34,6 +36,24 @@ TEST_F(ModelEdit, EveryEffectOfTheCatalogueCanBeAddedReadAndRemoved) {
     for (const auto& [key, setting] : model.effects[0].parameters) any_free |= setting.free;
     EXPECT_TRUE(any_free) << effect->name();
     EXPECT_EQ(without_effect(read_model_text(path), effect->name()), base) << effect->name();
+  }
+}
+
+TEST_F(ModelEdit, AStartingModelCarriesItsBodyAndMayBeEdited) {
+  const simulation::Model model = read_model(file(starting_model(163)));
+  const simulation::Setting& modulus = model.breast.young_modulus_kpa;
+  EXPECT_NEAR(1000 * 9.81e-6 * 163 / modulus.value, 0.4, 0.02);  // ρ g H / E
+  EXPECT_TRUE(modulus.free && modulus.prior_sd);
+  EXPECT_LT(modulus.lower, 0.2 * modulus.value);
+  EXPECT_NO_THROW(read_model(file(with_effect(read_model_text(file(starting_model(60))), "ligament"))));
+}
+
+TEST_F(ModelEdit, NoModulusSuitsABodyAThousandTimesTooSmall) {
+  try {
+    starting_model(0.016);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("are its coordinates in mm?"), std::string::npos) << error.what();
   }
 }
 

@@ -20,7 +20,8 @@
     const names = Object.keys(voxels || (v && v.voxels) || {}).filter((t) => t !== "air" && (voxels || v.voxels)[t] > 0);
     if (!names.length) return "";
     return supine.table_figure("volumes", "Tissues, ml", [{ title: "tissue", key: "tissue" }, { title: "voxels", key: "voxels", digits: 1 }, { title: "mesh", key: "mesh", digits: 1 }],
-      names.map((t) => ({ tissue: t, voxels: voxels ? voxels[t] : v.voxels[t], mesh: v && t in v.mesh ? v.mesh[t] : null })));
+      names.map((t) => ({ tissue: t, voxels: voxels ? voxels[t] : v.voxels[t], mesh: v && t in v.mesh ? v.mesh[t] : null })),
+      at("labels.json", ["gland_by_share_ml"]) ? { caption: el("span", {}, "Outlined gland is part fat: ", shown("labels.json", ["gland_by_share_ml"], 1), " ml are gland, which is what the mesh takes.") } : {});
   };
   const regions = () => {
     const m = data.figures["mesh.json"];
