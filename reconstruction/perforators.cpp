@@ -16,7 +16,7 @@ using segmentation::Tissue;
 
 struct Piece {
   Eigen::Vector3i low = Eigen::Vector3i::Constant(1 << 30), high = Eigen::Vector3i::Constant(-1);
-  long muscle_faces = 0, excluded_faces = 0, tissue_faces = 0, other_faces = 0;
+  long muscle_faces = 0, tissue_faces = 0, other_faces = 0;
 };
 
 Mask meshed_mask(const LabelImage& image) {
@@ -39,8 +39,6 @@ void add_voxel(const LabelImage& image, const Mask& thin, const Eigen::Vector3i&
       const Tissue beyond = static_cast<Tissue>(image.at(to.x(), to.y(), to.z()));
       if (beyond == Tissue::muscle)
         ++piece.muscle_faces;
-      else if (beyond == Tissue::excluded)
-        ++piece.excluded_faces;
       else if (!is_meshed(beyond))
         ++piece.other_faces;
       else if (!thin[image.grid.index(to.x(), to.y(), to.z())])
@@ -51,8 +49,7 @@ void add_voxel(const LabelImage& image, const Mask& thin, const Eigen::Vector3i&
 bool is_perforator(const Piece& piece, const Grid& grid, double thinnest_mm) {
   const Eigen::Vector3d size_mm =
       (piece.high - piece.low + Eigen::Vector3i::Ones()).cast<double>().cwiseProduct(grid.spacing_mm);
-  return size_mm.norm() > thinnest_mm && piece.other_faces == 0 && piece.muscle_faces > piece.excluded_faces &&
-         piece.muscle_faces > 2 * piece.tissue_faces;
+  return size_mm.norm() > thinnest_mm && piece.other_faces == 0 && piece.muscle_faces > 2 * piece.tissue_faces;
 }
 
 template <class Visit>

@@ -9,8 +9,7 @@ namespace supine::reconstruction {
 /// tetrahedron of useful size fits into them, and the breast does not slide along them.
 ///
 /// A perforator is a piece of what opening by a ball takes away that is longer than the ball is thick, borders on
-/// nothing but muscle, meshed tissue and what is excluded, and on muscle more than on what is excluded and more than
-/// twice as much as on tissue. So is a cleft between two muscles that ends where the excluded begins.
+/// nothing but muscle and meshed tissue, and on muscle more than twice as much.
 /// @param thinnest_mm  diameter of the ball, >= 0; 0 = nothing is changed
 /// @return volume turned, mm³
 double turn_perforators_into_muscle(segmentation::LabelImage& image, double thinnest_mm);

@@ -37,22 +37,6 @@ TEST(Perforators, VesselInTheMuscleBecomesMuscleAndNothingElseChanges) {
   EXPECT_DOUBLE_EQ(changed_mm3, turned_mm3);
 }
 
-// A cleft of 2 mm between chest muscle and the muscle of the side, which ends where the excluded begins.
-TEST(Perforators, CleftBetweenTwoMusclesThatEndsAtTheExcludedBecomesMuscle) {
-  const auto cleft = [](double below_mm) {
-    return testing::voxelise(testing::cubic_grid(Eigen::Vector3d(44, 36, 44), 0.75), [=](const Eigen::Vector3d& at) {
-      const Tissue around = testing::dome_on_slab(at);
-      if (std::abs(at.x() - 3) < 1 && std::abs(at.z()) < 5 && at.y() > -4 && at.y() < 5) return Tissue::adipose;
-      return around == Tissue::muscle && at.y() >= 5 - below_mm ? Tissue::excluded : around;
-    });
-  };
-  LabelImage between = cleft(0);
-  EXPECT_NEAR(turn_perforators_into_muscle(between, 3), 2 * 10 * 5, 20);
-  // The same gap mostly inside of what is excluded is no perforator: a body may end there, thin as it is.
-  LabelImage excluded = cleft(4.5);
-  EXPECT_EQ(turn_perforators_into_muscle(excluded, 3), 0);
-}
-
 TEST(Perforators, ThickOnesAndTheOptionZeroLeaveTheImageAlone) {
   LabelImage thick = dome_with_vessel(8), thin = dome_with_vessel(2);
   EXPECT_EQ(turn_perforators_into_muscle(thick, 3), 0);
