@@ -17,6 +17,7 @@ constexpr double stands_out = 0.05;       // inclusion from which more than two 
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
 constexpr double cost_of_an_idle_effect = 1;  // ln evidence, by and large
 constexpr std::size_t singles_to_draw_from = 3, most_further = 8, most_where_lines_bend = 6;  // the last: times refits
+constexpr std::size_t most_on_from_first = 5;
 
 /// Effects that appear in what is screened with at least some probability.
 bool something_stands_out(const Findings& found) {
@@ -74,10 +75,8 @@ class Follower {
       if (next == nullptr) break;
       follow_one(next->effects);
     }
-    if (bent_)
-      one_at_a_time();
-    else
-      again_from_first();
+    if (!bent_) on_from_first();
+    if (bent_) one_at_a_time();
   }
 
  private:
@@ -205,6 +204,21 @@ class Follower {
       after = before;
     found_.refits.pop_back();
     weigh();
+  }
+
+  /// What stands out was followed; beside it other effects may do more than lines from nothing say: lines are drawn
+  /// from it, and what they promise is followed.
+  void on_from_first() {
+    if (options_.refits == 0 || found_.hypotheses.front().effects.empty()) return again_from_first();
+    for (std::size_t further = 0; further < most_on_from_first && !bent_; ++further) {
+      const std::size_t at = first_to_draw_from();
+      if (at < found_.refits.size()) draw_from(at);
+      const Hypothesis* next = next_to_refit(found_.hypotheses);
+      if (next == nullptr) next = simpler_than_first(found_.hypotheses);
+      if (next == nullptr) break;
+      follow_one(next->effects);
+    }
+    if (!bent_) again_from_first();
   }
 
   bool may_follow_more() const {

@@ -103,10 +103,6 @@ Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
   return {.mesh = mechanics.mesh(), .anatomy = mechanics.anatomy(), .layout = mechanics.layout(), .pose = pose};
 }
 
-}  // namespace
-
-namespace {
-
 /// A body that cannot be turned over has the one way, and all the work for it.
 SolveOptions work_of(SolveOptions options, const PoseLoad& imaged) {
   constexpr double both_ways = 1.8;

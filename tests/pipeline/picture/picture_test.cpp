@@ -128,6 +128,12 @@ TEST_F(Pictures, AScanThatCoversNothingIsDrawnItself) {
   draw_distances(folder_ / "bare.vtp", "the same title", "left", folder_ / "scan.png", scan);
   draw_distances(folder_ / "bare.vtp", "the same title", "left", folder_ / "grey.png");
   EXPECT_GT(coloured_share(folder_ / "scan.png"), coloured_share(folder_ / "grey.png") + 0.02);
+  try {
+    draw_distances(folder_ / "bare.vtp", "", "left", folder_ / "none.png", small_run() / "out/breast.vtp");
+    FAIL();
+  } catch (const InputError& error) {
+    expect_words(error.what(), {"breast.vtp", "no points with distance_mm"});
+  }
 }
 
 TEST_F(Pictures, APlacementShowsTheScanAsGivenAndAsFound) {
