@@ -29,7 +29,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 EQUIVALENT = ROOT / "bench" / "mutants_equivalent.txt"
 LONGEST_BUILD_S, LONGEST_TESTS_S = 1200, 150
 FOLDERS = {
-    "simulation": ["test_simulation", "test_verification"],
+    "simulation": ["test_simulation", "test_export", "test_verification"],
     "calibration": ["test_calibration", "test_fitting"],
     "diagnosis": ["test_diagnosis"],
 }

@@ -12,6 +12,7 @@ namespace supine::diagnosis {
 namespace {
 
 constexpr double worth_refitting = 0.01;  // screened probability
+constexpr double worth_going_on = 0.1;    // the same along lines from what stands out
 constexpr double held_by_refits = 0.99;   // of the screened probability
 constexpr double stands_out = 0.05;       // inclusion from which more than two sets are followed
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
@@ -28,11 +29,11 @@ bool something_stands_out(const Findings& found) {
 
 bool is_open(const Hypothesis& h) { return !h.effects.empty() && !h.refitted && !h.unsolved; }
 
-/// The next hypothesis that should be followed through the chain, or nullptr.
-const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses) {
+/// The next hypothesis that should be followed through the chain, or nullptr. @param least  of its probability
+const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses, double least = worth_refitting) {
   double sum = 0;
   for (const Hypothesis& h : hypotheses) {
-    if (is_open(h) && h.probability >= worth_refitting) return &h;
+    if (is_open(h) && h.probability >= least) return &h;
     sum += h.probability;
     if (sum >= held_by_refits) break;
   }
@@ -213,7 +214,7 @@ class Follower {
     for (std::size_t further = 0; further < most_on_from_first && !bent_; ++further) {
       const std::size_t at = first_to_draw_from();
       if (at < found_.refits.size()) draw_from(at);
-      const Hypothesis* next = next_to_refit(found_.hypotheses);
+      const Hypothesis* next = next_to_refit(found_.hypotheses, worth_going_on);
       if (next == nullptr) next = simpler_than_first(found_.hypotheses);
       if (next == nullptr) break;
       follow_one(next->effects);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "simulation/parameters.h"
 
 namespace supine::calibration {
 namespace {
@@ -39,6 +40,14 @@ TEST(FreeParameters, CoordinatesAndValuesAreInverse) {
     const double slope = (parameters.value(i, 0.3 + h) - parameters.value(i, 0.3 - h)) / (2 * h);
     EXPECT_NEAR(parameters.slope(Eigen::VectorXd::Constant(3, 0.3))[i], slope, 1e-7 * std::abs(slope));
   }
+}
+
+TEST(FreeParameters, StepsAreAsLongAsThePriorOrTheCatalogueSay) {
+  const FreeParameters parameters(model_with_ligament());
+  EXPECT_NEAR(parameters.value(1, 1) - parameters.value(1, 0), 0.2, 1e-15);  // its prior_sd
+  const double spread = simulation::find_parameter("gravity_tilt.roll_rad")->spread;
+  ASSERT_GT(spread, 0);
+  EXPECT_NEAR(parameters.value(2, 1) - parameters.value(2, 0), spread, 1e-15);  // no prior_sd is written
 }
 
 TEST(FreeParameters, ModelCarriesTheNumbersAndNothingElseChanges) {

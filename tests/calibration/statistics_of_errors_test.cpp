@@ -149,6 +149,19 @@ TEST(HeldOut, BlocksAreSixPiecesThatDoNotDependOnOrder) {
       }
 }
 
+TEST(HeldOut, EveryPointBelongsToTheBlockWhoseMeanIsNearest) {
+  const Residuals r = patch(900, 0.7, 0, 10, 7);
+  const Eigen::VectorXi block = spatial_blocks(r);
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(6, 2);
+  for (Eigen::Index i = 0; i < r.size(); ++i)
+    mean.row(block[i]) += r.q.row(i) / static_cast<double>((block.array() == block[i]).count());
+  for (Eigen::Index i = 0; i < r.size(); ++i) {
+    Eigen::Index nearest;
+    (mean.rowwise() - r.q.row(i)).rowwise().squaredNorm().minCoeff(&nearest);
+    EXPECT_EQ(block[i], nearest) << i;
+  }
+}
+
 TEST(HeldOut, IsTheErrorOfAFitWithoutTheBlock) {
   Residuals r = patch(400, 0.7, 0.5, 15, 9);
   const Eigen::MatrixXd slope = smooth_slopes(r);

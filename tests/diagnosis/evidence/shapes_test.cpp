@@ -149,6 +149,15 @@ TEST(Patchiness, ShapesLeaveOutWhatTheModuliMakeUpForAndGrowWithTheirSize) {
   Patchiness twice;
   twice.tissue *= 2, twice.skin *= 2, twice.muscle_mm *= 2;
   EXPECT_LT((shapes(twice) - 2 * usual).norm(), 1e-9 * usual.norm());
+  // Each of the three fields moves the skin by itself.
+  double of_all = 0;
+  for (const Patchiness& alone : {Patchiness{.skin = 0, .muscle_mm = 0}, Patchiness{.tissue = 0, .muscle_mm = 0},
+                                  Patchiness{.tissue = 0, .skin = 0}}) {
+    const double square = shapes(alone).squaredNorm();
+    EXPECT_GT(square, 1e-3 * usual.squaredNorm());
+    of_all += square;
+  }
+  EXPECT_NEAR(of_all, usual.squaredNorm(), 1e-9 * usual.squaredNorm());
   const double rms = std::sqrt(usual.squaredNorm() / static_cast<double>(usual.rows()));
   EXPECT_GT(rms, 0.05);
   EXPECT_LT(rms, 3);
