@@ -65,6 +65,18 @@ TEST(Uncertainty, SharedErrorsWidenTheIntervals) {
   EXPECT_LT(together.effective_points, 0.9 * alone.effective_points);
 }
 
+TEST(Uncertainty, PriorsCountAsFurtherInformationWhereTheyAreUsed) {
+  simulation::Model start = twin_truth();
+  start.breast.young_modulus_kpa.prior_sd = 0.001 * start.breast.young_modulus_kpa.value;
+  Fitted f(start);
+  const Eigen::MatrixXd without = judge(f.fit, f.parameters, false).white,
+                        with = judge(f.fit, f.parameters, true).white;
+  Eigen::MatrixXd information = without.inverse();
+  information.diagonal() += f.parameters.prior_information();
+  EXPECT_LT((with - information.inverse()).norm(), 1e-9 * with.norm());
+  EXPECT_LT(with(0, 0), 0.5 * without(0, 0));
+}
+
 TEST(Uncertainty, ModulusAndThicknessOfTheSkinCannotBeToldApart) {
   simulation::Model start = twin_truth();
   start.skin.thickness_mm = {1.5, true, {}, 0.3, 5};

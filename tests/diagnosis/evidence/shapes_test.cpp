@@ -8,6 +8,7 @@
 
 #include "calibration/signed_distance.h"
 #include "diagnosis/evidence/discrepancy.h"
+#include "diagnosis/evidence/hypotheses.h"
 #include "diagnosis/evidence/linear_evidence.h"
 #include "diagnosis/evidence/nuisances.h"
 #include "diagnosis/evidence/patchiness.h"
@@ -161,6 +162,40 @@ TEST(Patchiness, ShapesLeaveOutWhatTheModuliMakeUpForAndGrowWithTheirSize) {
   const double rms = std::sqrt(usual.squaredNorm() / static_cast<double>(usual.rows()));
   EXPECT_GT(rms, 0.05);
   EXPECT_LT(rms, 3);
+}
+
+// A nuisance of the effect's own kind says a part of its usual size: the secant is of the rest, as if of all.
+TEST(Secants, GoOnFromWhatANuisanceSays) {
+  Solved solved;
+  BaseFit base;
+  base.noise_mm = {0.3};
+  base.fit.prediction = solved.prediction;
+  base.fit.mask = solved.mask;
+  base.fit.residuals = solved.residuals;
+  const Eigen::VectorXd at_rest = base.fit.residuals.distance_mm;
+  base.model = solved.model;
+  const simulation::Parameter& row = *simulation::find_parameter("adhesion.log_factor");
+  const double usual = row.median - row.null;
+  const auto secant = [&](double share) {
+    base.nuisances = {{"springs", "", "adhesion", "log_factor", 0.5 * usual, {}, 2 * share}};
+    std::vector<Candidate> candidates = {
+        {"adhesion",
+         {{"adhesion.log_factor", row.unit, row.null, row.lower, row.upper, usual, row.one_sided}},
+         {},
+         {}}};
+    find_secants(solved.twin.scene(), base, base, candidates);
+    return candidates[0];
+  };
+  for (const double share : {0.0, 0.4}) {
+    const Candidate found = secant(share);
+    EXPECT_NEAR(found.secant_to, (1 - share) * usual, 1e-12);
+    simulation::Model moved = solved.model;
+    moved.effects.push_back(simulation::null_setting(*simulation::find_effect("adhesion")));
+    moved.effects.back().parameters["log_factor"].value = row.null + (1 - share) * usual;
+    const Eigen::VectorXd change = solved.distances_of(moved) - at_rest;
+    EXPECT_LT(((1 - share) * found.secant - change).norm(), 1e-3 * change.norm());
+  }
+  EXPECT_EQ(secant(0.8).secant_to, 0);  // a fifth is left: the slope is as good
 }
 
 TEST(Discrepancy, HasAMeanSquareOfOneAndIsACovariance) {
