@@ -24,7 +24,7 @@
   supine.answer = () =>
     el("section", { id: "answer", class: "answer " + data.answer.kind, "aria-label": "answer" },
       el("p", { class: "sentence" }, data.answer.sentence), tiles(),
-      data.answer.facts.map((fact) => el("p", {}, fact)),
-      data.answer.next ? el("p", {}, el("strong", {}, "Next: "), data.answer.next) : "",
+      data.answer.facts.map((fact) => el("p", {}, supine.prose(fact))),
+      data.answer.next ? el("p", {}, el("strong", {}, "Next: "), supine.prose(data.answer.next)) : "",
       data.answer.command ? command(data.answer.command) : "", warnings());
 })();

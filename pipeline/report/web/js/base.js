@@ -14,6 +14,9 @@ const supine = (window.supine = {});
   };
   const el = (tag, attributes, ...children) => fill(document.createElement(tag), attributes, children);
 
+  // What stands between backticks is code.
+  const prose = (text) => String(text).split("`").map((part, i) => (i % 2 ? el("code", {}, part) : part));
+
   // A figure of a sidecar; null when the file or the key is not there.
   const at = (file, path) => {
     let value = data.figures[file];
@@ -56,11 +59,11 @@ const supine = (window.supine = {});
     const { fill: how, shows } = stage(name);
     const is_command = /^(make|build|supine)/.test(how);
     return el("div", { class: "gap" }, `${what || "Not there yet: " + shows + "."} ${is_command ? "To get it:" : "It needs"} `,
-      is_command ? command(how) : how + ".");
+      is_command ? command(how) : [prose(how), "."]);
   };
   const section = (id, title, ...content) =>
     el("section", { id, "aria-labelledby": id + "-title" }, el("h2", { id: id + "-title" }, title), ...content);
   const first_file = (...names) => names.find((name) => data.figures[name]) || null;
 
-  Object.assign(supine, { data, fill, el, at, number, signed, sensible, p_value, shown, is_object, of_body, words, parameter, command, stage, gap, section, first_file });
+  Object.assign(supine, { data, fill, el, prose, at, number, signed, sensible, p_value, shown, is_object, of_body, words, parameter, command, stage, gap, section, first_file });
 })();
