@@ -12,7 +12,7 @@ namespace supine::diagnosis {
 namespace {
 
 constexpr double worth_refitting = 0.01;  // screened probability
-constexpr double worth_going_on = 0.1;    // the same along lines from what stands out
+constexpr double worth_going_on = 0.1;    // the same of what holds more than a likeliest set that was followed
 constexpr double held_by_refits = 0.99;   // of the screened probability
 constexpr double stands_out = 0.05;       // inclusion from which more than two sets are followed
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
@@ -29,19 +29,21 @@ bool something_stands_out(const Findings& found) {
 
 bool is_open(const Hypothesis& h) { return !h.effects.empty() && !h.refitted && !h.unsolved; }
 
-/// The next hypothesis that should be followed through the chain, or nullptr. @param least  of its probability
-const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses, double least = worth_refitting) {
+bool is_part_of(const Hypothesis& part, const Hypothesis& whole) {
+  return std::includes(whole.effects.begin(), whole.effects.end(), part.effects.begin(), part.effects.end());
+}
+
+/// The next hypothesis that should be followed through the chain, or nullptr.
+/// @param least_with_first  probability of one that holds more than the likeliest and all of it
+const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses, double least_with_first = worth_refitting) {
   double sum = 0;
   for (const Hypothesis& h : hypotheses) {
+    const double least = is_part_of(hypotheses.front(), h) ? least_with_first : worth_refitting;
     if (is_open(h) && h.probability >= least) return &h;
     sum += h.probability;
     if (sum >= held_by_refits) break;
   }
   return nullptr;
-}
-
-bool is_part_of(const Hypothesis& part, const Hypothesis& whole) {
-  return std::includes(whole.effects.begin(), whole.effects.end(), part.effects.begin(), part.effects.end());
 }
 
 /// The likeliest hypothesis less one effect, not followed yet; nullptr where there is none. Straight lines do the
@@ -69,7 +71,7 @@ class Follower {
     if (options_.refits > 0) follow_expected();
     auto most = static_cast<std::size_t>(options_.refits);
     if (!something_stands_out(found_)) most = std::min(most, refits_when_quiet);
-    for (std::size_t simpler = 0; !bent_;) {
+    for (std::size_t simpler = 0; !bent_ && !(first_holds_an_effect() && found_.hypotheses.front().refitted);) {
       const Hypothesis* next = found_.refits.size() < most ? next_to_refit(found_.hypotheses) : nullptr;
       if (next == nullptr && most > 0 && simpler < most_simpler)
         next = simpler_than_first(found_.hypotheses), ++simpler;
@@ -86,6 +88,8 @@ class Follower {
     for (const int e : effects) names.push_back(found_.candidates[static_cast<std::size_t>(e)].effect);
     if (options_.progress) options_.progress(fmt::format("{} {}", what, fmt::join(names, " and ")));
   }
+
+  bool first_holds_an_effect() const { return !found_.hypotheses.front().effects.empty(); }
 
   void weigh() {
     lower_unfollowed(found_.hypotheses);
@@ -210,8 +214,7 @@ class Follower {
   /// What stands out was followed; beside it other effects may do more than lines from nothing say: lines are drawn
   /// from it, and what they promise is followed.
   void on_from_first() {
-    if (options_.refits == 0 || found_.hypotheses.front().effects.empty()) return again_from_first();
-    for (std::size_t further = 0; further < most_on_from_first && !bent_; ++further) {
+    for (std::size_t further = 0; further < most_on_from_first && !bent_ && first_holds_an_effect(); ++further) {
       const std::size_t at = first_to_draw_from();
       if (at < found_.refits.size()) draw_from(at);
       const Hypothesis* next = next_to_refit(found_.hypotheses, worth_going_on);
