@@ -78,7 +78,7 @@ class Follower {
       if (next == nullptr) break;
       follow_one(next->effects);
     }
-    if (!bent_) on_from_first();
+    if (!bent_ && most > 0) on_from_first();
     if (bent_) one_at_a_time();
   }
 
@@ -212,7 +212,7 @@ class Follower {
   }
 
   /// What stands out was followed; beside it other effects may do more than lines from nothing say: lines are drawn
-  /// from it, and what they promise is followed.
+  /// from it and what they promise is followed.
   void on_from_first() {
     for (std::size_t further = 0; further < most_on_from_first && !bent_ && first_holds_an_effect(); ++further) {
       const std::size_t at = first_to_draw_from();
