@@ -2,11 +2,11 @@
 #include "reconstruction/handles.h"
 
 #include <algorithm>
-#include <array>
 #include <map>
 
 #include "reconstruction/surface_check.h"
 #include "reconstruction/voxel_surface.h"
+#include "segmentation/label_map.h"
 #include "segmentation/masks.h"
 #include "segmentation/tissue.h"
 
@@ -16,6 +16,7 @@ namespace {
 using segmentation::Grid;
 using segmentation::LabelImage;
 using segmentation::Mask;
+using segmentation::meshed_mask;
 using segmentation::Tissue;
 
 // Balls of the 6, 18 and 26 neighbours of a voxel, and of two voxels.
@@ -24,12 +25,6 @@ constexpr double radii_voxels[] = {1.0, 1.5, 1.8, 2.3};
 enum class Change { fill, remove };
 
 bool meshed(std::uint8_t label) { return is_meshed(static_cast<Tissue>(label)); }
-
-Mask meshed_mask(const LabelImage& image) {
-  Mask mask(image.voxels.size());
-  std::transform(image.voxels.begin(), image.voxels.end(), mask.begin(), meshed);
-  return mask;
-}
 
 SurfaceReport report_of(const LabelImage& image) {
   return check_surface(voxel_surface(image, meshed_tissues()).surface);
@@ -106,9 +101,7 @@ std::vector<std::uint8_t> repaint(LabelImage& image, const Piece& piece, Change 
   std::vector<std::uint8_t> before;
   for (const Eigen::Vector3i& v : piece.voxels) before.push_back(label_at(v));
   const bool wanted = change == Change::fill;
-  bool painted = true;
-  while (painted) {
-    painted = false;
+  for (bool painted = true; painted;) {
     std::vector<std::pair<Eigen::Vector3i, int>> layer;
     for (const Eigen::Vector3i& v : piece.voxels)
       if (meshed(label_at(v)) != wanted)

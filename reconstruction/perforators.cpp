@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "segmentation/label_map.h"
 #include "segmentation/masks.h"
 #include "segmentation/tissue.h"
 
@@ -12,18 +13,13 @@ namespace {
 using segmentation::Grid;
 using segmentation::LabelImage;
 using segmentation::Mask;
+using segmentation::meshed_mask;
 using segmentation::Tissue;
 
 struct Piece {
   Eigen::Vector3i low = Eigen::Vector3i::Constant(1 << 30), high = Eigen::Vector3i::Constant(-1);
   long muscle_faces = 0, tissue_faces = 0, other_faces = 0;
 };
-
-Mask meshed_mask(const LabelImage& image) {
-  Mask mask(image.voxels.size());
-  for (std::size_t v = 0; v < mask.size(); ++v) mask[v] = is_meshed(static_cast<Tissue>(image.voxels[v]));
-  return mask;
-}
 
 void add_voxel(const LabelImage& image, const Mask& thin, const Eigen::Vector3i& at, Piece& piece) {
   piece.low = piece.low.cwiseMin(at);

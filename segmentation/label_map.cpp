@@ -82,6 +82,12 @@ MappedLabels map_labels(const GreyImage& values, const std::map<int, Tissue>& ta
   return mapped;
 }
 
+Mask meshed_mask(const LabelImage& labels) {
+  Mask mask(labels.voxels.size());
+  std::transform(labels.voxels.begin(), labels.voxels.end(), mask.begin(), is_tissue);
+  return mask;
+}
+
 TissueCounts count_tissues(const LabelImage& labels) {
   std::array<std::size_t, 256> histogram{};
   for (const auto value : labels.voxels) ++histogram[value];

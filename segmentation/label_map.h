@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "segmentation/image.h"
+#include "segmentation/masks.h"
 #include "segmentation/tissue.h"
 
 namespace supine::segmentation {
@@ -22,6 +23,9 @@ struct MappedLabels {
 /// @param name  of the file, for messages
 /// @throws InputError  for a value that is not in the table: value, count, first place in mm
 MappedLabels map_labels(const GreyImage& values, const std::map<int, Tissue>& table, const std::string& name);
+
+/// The voxels of all tissues that tetrahedra are made of.
+Mask meshed_mask(const LabelImage& labels);
 
 /// Voxels per tissue, index = Tissue.
 using TissueCounts = std::array<std::size_t, tissue_count>;

@@ -3,11 +3,12 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/error.h"
-#include "simulation/fields.h"
 #include "simulation/parameters.h"
+#include "simulation/solve/chain.h"
 
 namespace supine::pipeline {
 namespace {
@@ -25,8 +26,12 @@ double two_digits(double value) {
 }  // namespace
 
 std::string starting_model(double mound_height_mm) {
-  constexpr double weight_kpa_per_mm = 1e-9 * density_kg_m3 * simulation::gravity_mm_s2;
-  const double modulus_kpa = two_digits(weight_kpa_per_mm * mound_height_mm / load_number);
+  meshing::Anatomy body;
+  body.mound_height_mm = mound_height_mm;
+  simulation::Model of_one_kpa;
+  of_one_kpa.breast.density_kg_m3.value = density_kg_m3;
+  of_one_kpa.breast.young_modulus_kpa.value = 1;
+  const double modulus_kpa = two_digits(simulation::load_number(body, of_one_kpa) / load_number);
   const simulation::Parameter& range = *simulation::find_parameter("breast.young_modulus_kpa");
   if (!(modulus_kpa >= range.lower && modulus_kpa <= range.upper))
     throw InputError(

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "segmentation/chest/sampler.h"
+#include "segmentation/label_map.h"
 #include "segmentation/tissue.h"
 
 namespace supine::segmentation {
@@ -31,12 +32,6 @@ double grey_along(const GreyImage& image, Eigen::Vector3d from, const Eigen::Vec
       ++count;
     }
   return count > 0 ? sum / count : NAN;
-}
-
-Mask meshed_mask(const LabelImage& labels) {
-  Mask mask(labels.voxels.size());
-  for (std::size_t n = 0; n < mask.size(); ++n) mask[n] = is_meshed(static_cast<Tissue>(labels.voxels[n]));
-  return mask;
 }
 
 /// Whether the skin of a column faces the front, so that straight ahead of it is outside.

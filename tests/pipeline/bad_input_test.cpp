@@ -242,5 +242,18 @@ INSTANTIATE_TEST_SUITE_P(CaseAndModel, BadInputs, testing::ValuesIn(case_and_mod
 INSTANTIATE_TEST_SUITE_P(Surfaces, BadInputs, testing::ValuesIn(surfaces), name_of);
 INSTANTIATE_TEST_SUITE_P(Scans, BadInputs, testing::ValuesIn(scans), name_of);
 
+TEST(StartingModel, NeedsABreastAndItsMesh) {
+  const auto start = [](std::vector<std::string> words) {
+    words.insert(words.begin(), {tool("model"), "start"});
+    return run_process(words);
+  };
+  const Finished object = start({std::string(SUPINE_SOURCE_DIR) + "/samples/silicone_bar/both", "none.vtu"});
+  EXPECT_EQ(object.code, 2);
+  EXPECT_NE(object.err.find("is not a breast"), std::string::npos) << object.err;
+  const Finished alone = start({std::string(SUPINE_SOURCE_DIR) + "/samples/ligament"});
+  EXPECT_EQ(alone.code, 2);
+  EXPECT_NE(alone.err.find("start takes a case folder and its mesh"), std::string::npos) << alone.err;
+}
+
 }  // namespace
 }  // namespace supine::pipeline
