@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""How often the 95 % regions of supine-targets hold the truth: target_coverage.py CASES WORK [BIN] [--only WORDS] [--score]
+"""How often the 95 % regions of supine-targets hold the truth: target_coverage.py CASES WORK [BIN] [--only WORDS] [--diagnose] [--score]
 
 CASES holds case folders and answers/NAME.json. Where the answer has `targets` (supine-phantom), those places are asked for; landmarks that were
 measured in the pose are held against where all else expects them, in every case. Meshes and answers of the tool go to WORK and are kept: what is
-there is not made again. --score makes nothing and counts what is there.
+there is not made again. --diagnose asks for regions over the sets of effects that supine-diagnose finds (from the case's own model), in place of
+straight lines at the fit. --score makes nothing and counts what is there.
 """
 import argparse
 import csv
@@ -25,7 +26,7 @@ def run(binaries, tool, *words):
         raise RuntimeError(f"supine-{tool}: {done.stderr.strip()}")
 
 
-def make(binaries, case, answer, out):
+def make(binaries, case, answer, out, diagnose):
     """Mesh and regions of a case."""
     out.mkdir(parents=True, exist_ok=True)
     done = subprocess.run(["make", "-f", str(ROOT / "pipeline" / "Makefile"), f"BIN={binaries}", f"CASE={case}", f"OUT={out}", "THREADS=1", "mesh"],
@@ -39,6 +40,9 @@ def make(binaries, case, answer, out):
             table.writerow(["name", "x", "y", "z"])
             table.writerows([t["name"], *t["prone_mm"]] for t in answer["targets"])
         asked = ["--points", out / "asked.csv"]
+    if diagnose:
+        run(binaries, "diagnose", case, out / "mesh.vtu", "-o", out)
+        asked += ["--diagnosis", out / "diagnosis.json"]
     run(binaries, "targets", case, out / "mesh.vtu", *asked, "--pose", POSE, "--no-further-scans", "-o", out / "targets")
 
 
@@ -128,6 +132,7 @@ def main():
     parser.add_argument("work", type=pathlib.Path)
     parser.add_argument("bin", type=pathlib.Path, nargs="?", default=pathlib.Path("build/bin"))
     parser.add_argument("--only", default="")
+    parser.add_argument("--diagnose", action="store_true")
     parser.add_argument("--score", action="store_true")
     given = parser.parse_args()
     groups = {}
@@ -139,7 +144,7 @@ def main():
             continue
         try:
             if not told.exists():
-                make(given.bin.resolve(), case, answer, out)
+                make(given.bin.resolve(), case, answer, out, given.diagnose)
         except RuntimeError as why:
             print(f"{case.name}: {why}", file=sys.stderr)
             continue

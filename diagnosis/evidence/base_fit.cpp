@@ -8,6 +8,7 @@
 
 #include "calibration/noise.h"
 #include "common/error.h"
+#include "diagnosis/creases.h"
 #include "diagnosis/evidence/discrepancy.h"
 #include "diagnosis/evidence/field_modes.h"
 #include "diagnosis/weighted_fit.h"
@@ -61,6 +62,18 @@ ScanNoise noise_of(const Residuals& residuals, const VectorXd& shared_mm,
   return noise;
 }
 
+/// What creases of the model's skin may do.
+void add_creases(const CreaseError& creases, BaseFit& base) {
+  base.creased_points = creases.points;
+  if (creases.points == 0) return;
+  const calibration::Clusters& c = base.clusters;
+  const VectorXd sd = c.means(creases.sd_mm);
+  for (Index i = 0; i < base.errors.rows(); ++i)
+    for (Index j = 0; j < base.errors.cols(); ++j)
+      if (sd[i] * sd[j] > 0 && c.related(i, j))
+        base.errors(i, j) += sd[i] * sd[j] * std::exp(-(c.place.row(i) - c.place.row(j)).norm() / creases.length_mm);
+}
+
 /// What scanners err together, and what the mesh does beyond what is taken away.
 void add_shared(const BaseFit& base, const Priors& priors, const VectorXd& shared_mm, MatrixXd& errors) {
   const calibration::Clusters& c = base.clusters;
@@ -94,6 +107,7 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
   const VectorXd variance = base.clusters.means(base.noise_of_point_mm.cwiseAbs2().cwiseProduct(base.repeats));
   base.errors = variance.cwiseQuotient(base.clusters.members).asDiagonal();
   add_shared(base, priors, base.clusters.means(noise.shared_mm), base.errors);
+  add_creases(crease_error(evaluator.scene(), base.fit.prediction, residuals), base);
   base.patches = base.clusters.means(
       patchiness_shapes(evaluator.chain(), sensitivities, base.fit.prediction, residuals, priors.patchiness));
   base.errors += base.patches * base.patches.transpose();

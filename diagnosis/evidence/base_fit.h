@@ -31,6 +31,7 @@ struct BaseFit : JointFit {
   Eigen::MatrixXd kernel;             ///< K over the clusters
   std::unique_ptr<ErrorCovariance> covariance;  ///< of both
   double scale_mm = 0, most_mm = 0;             ///< of the prior of the discrepancy's size
+  Eigen::Index creased_points = 0;              ///< of the scans, over creases of the model's skin (creases.h)
   std::optional<NumericalError> numerical;      ///< none: the mesh is taken to be exact
 
   /// Distances over the clusters, the mesh's error taken away.

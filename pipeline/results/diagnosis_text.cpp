@@ -44,6 +44,16 @@ void say_places(const Run& run, const Findings& found) {
                         place.turn_deg.norm(), place.sd.tail<3>().norm() / std::sqrt(3.0)));
 }
 
+/// Points that count for little, and why.
+void say_creases(const Run& run, const Findings& found) {
+  const auto creased = found.base.creased_points;
+  if (creased == 0) return;
+  run.say(fmt::format(
+      "  {} points of the scans ({:.0f} %) lie where the model's skin creases, as each mesh does otherwise: "
+      "they count for little",
+      creased, 100 * static_cast<double>(creased) / static_cast<double>(found.base.fit.residuals.skin_rows())));
+}
+
 /// What was expected of the body and turned out otherwise. Where something is missing it may have stood in for that.
 void say_unexpected(const Run& run, const Findings& found) {
   if (found.diagnosis.verdict == Verdict::missing || found.diagnosis.verdict == Verdict::ambiguous) return;
@@ -174,6 +184,7 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result) {
   const Findings& found = *result.found;
   const auto& b = found.budget;
   say_places(run, found);
+  say_creases(run, found);
   say_unexpected(run, found);
   say_hypotheses(run, found);
   run.say(
