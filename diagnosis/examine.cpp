@@ -156,7 +156,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   found->errors.emplace(found->base, found->base.nuisances, found->base.size_mm);
   found->candidates = find_candidates(evaluator, found->base.model, fit, found->unseen);
   tell(options, "effects at their usual size");
-  find_secants(subject.scene, found->base, found->base, found->candidates);
+  find_secants(subject.scene, found->base, found->base, found->candidates, true);
   find_stand_ins(subject.scene, found->base, *found->errors, options.priors, found->candidates);
   found->table = score_candidates(fit.residuals, found->errors->metric().mean_mm, fit.linearisation.slope,
                                   found->candidates, found->errors->whitening(), options.seed);

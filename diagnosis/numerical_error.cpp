@@ -12,7 +12,7 @@
 #include "diagnosis/other_mesh.h"
 #include "diagnosis/weighted_fit.h"
 #include "meshing/topology.h"
-#include "simulation/solve/pushed_forward.h"
+#include "simulation/embedding.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -194,15 +194,44 @@ void measure_of_linear(const calibration::MeasuredScene& scene, const simulation
   measure_on_coarse(scene, model, fit, near, result);
 }
 
+/// The shapes of a solution on the nodes of another mesh of the same body.
+simulation::ChainSolution carried(const simulation::ChainSolution& solution, const meshing::TetMesh& from,
+                                  const meshing::TetMesh& to) {
+  const simulation::Embedding nodes(from, to.points);
+  simulation::ChainSolution there;
+  there.prone = nodes.at(solution.prone);
+  there.X = nodes.at(solution.X);
+  for (const simulation::PoseSolution& pose : solution.poses)
+    there.poses.push_back({.name = pose.name, .x = nodes.at(pose.x), .report = {}});
+  return there;
+}
+
+/// What another mesh changes, and the model on it.
+/// @param near  the same of a similar model; nullptr, or without a mesh: that is the one that @p make makes
+template <class Make>
+Eigen::VectorXd change_on(const calibration::MeasuredScene& scene, const simulation::Model& model,
+                          const calibration::Fit& fit, const NumericalError::OnOther* near, Make make,
+                          NumericalError::OnOther& result) {
+  const bool known = near != nullptr && near->mesh;
+  result.mesh = known ? near->mesh : std::make_shared<const meshing::TetMesh>(make());
+  const simulation::ChainSolution start =
+      known ? near->solution : carried(fit.prediction.solution, *scene.mesh, *result.mesh);
+  calibration::Prediction there = predicted_on(scene, *result.mesh, model, &start, enough());
+  result.solution = std::move(there.solution);
+  return change(fit.residuals.distance_mm, distances_of(fit.residuals, there));
+}
+
 /// The same for quadratic ones, on two meshes side by side.
 void measure_on_two(const calibration::MeasuredScene& scene, const simulation::Model& model,
-                    const calibration::Fit& fit, NumericalError& result) {
-  const auto on = [&](const meshing::TetMesh& mesh) {
-    return change(fit.residuals.distance_mm,
-                  distances_of(fit.residuals, predicted_on(scene, mesh, model, nullptr, enough())));
+                    const calibration::Fit& fit, const NumericalError* near, NumericalError& result) {
+  const auto finer = [&] {
+    const auto make = [&] { return other_mesh(*scene.mesh, *scene.anatomy, edge_share); };
+    result.finer_mm = change_on(scene, model, fit, near ? &near->on_finer : nullptr, make, result.on_finer);
   };
-  const auto finer = [&] { result.finer_mm = on(other_mesh(*scene.mesh, *scene.anatomy, edge_share)); };
-  const auto coarser = [&] { result.coarser_mm = on(coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share)); };
+  const auto coarser = [&] {
+    const auto make = [&] { return coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share); };
+    result.coarser_mm = change_on(scene, model, fit, near ? &near->on_coarser : nullptr, make, result.on_coarser);
+  };
   FirstFailure failure;
 #pragma omp parallel sections
   {
@@ -290,7 +319,7 @@ NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, 
   if (scene.mesh->order() == 1)
     attempt(result.finer_failure, [&] { measure_of_linear(scene, model, fit, near, result); });
   else
-    measure_on_two(scene, model, fit, result);
+    measure_on_two(scene, model, fit, near, result);
   if (result.coarser_mm.size() == 0 && result.coarser_failure.empty()) result.coarser_failure = result.finer_failure;
   summarise(fit, result);
   return result;

@@ -25,6 +25,12 @@ struct NumericalError {
   /// Of linear elements, to start the next one from: both orders on the given mesh, or on `coarse` where there is one.
   std::shared_ptr<const meshing::TetMesh> coarse;
   simulation::ChainSolution linear, quadratic;
+  /// Of quadratic elements, for the same: the other meshes and the model on them.
+  struct OnOther {
+    std::shared_ptr<const meshing::TetMesh> mesh;
+    simulation::ChainSolution solution;
+  };
+  OnOther on_finer, on_coarser;
 };
 
 /// Spread where it could not be measured, as a share of the way that the body has moved. Correction and spread together

@@ -66,7 +66,7 @@ class Imitation {
     WeightedFit fit;
     {
       const calibration::TrialLimit limit(evaluator.chain(), base_.dearest);
-      fit = weigh(evaluator, there, metric_, start_of(there), &base_.fit.prediction.solution);
+      fit = weigh(evaluator, there, metric_, start_of(there), near(candidate, size));
     }
     if (!expected &&
         left_of(white(fit), metric_.whitening->apply(fit.solution.linearisation.slope)) > lines_agree * along_lines)
@@ -75,6 +75,12 @@ class Imitation {
     const VectorXd left = fit.solution.residuals.distance_mm + metric_.mean_mm;
     return std::make_shared<StandIn>(StandIn{there.model(fit.solution.u), std::move(fit.solution.prediction.solution),
                                              left, made_up(there, fit.solution.u)});
+  }
+
+  /// The shape at that size where a secant was drawn to it, else without the effect.
+  const simulation::ChainSolution* near(const Candidate& candidate, double size) const {
+    return candidate.secant_at && size == candidate.parameters[0].typical ? candidate.secant_at.get()
+                                                                          : &base_.fit.prediction.solution;
   }
 
   /// The base model with the effect at a size; of one that is expected with the others that are, free.

@@ -111,6 +111,13 @@ simulation::SolveOptions accurate_enough() {
   return options;
 }
 
+simulation::SolveOptions accurate_enough_far_away() {
+  simulation::SolveOptions options;
+  options.step_tolerance_mm = 1e-3;
+  options.residual_tolerance = 1e-6;
+  return options;
+}
+
 WeightedFit weigh(Evaluator& evaluator, const FreeParameters& parameters, const Metric& metric,
                   const Eigen::VectorXd& u, const simulation::ChainSolution* near) {
   WeightedFit result = predicted(evaluator, parameters, metric, u, near);

@@ -30,6 +30,8 @@ struct DescentOptions {
 
 /// Of all solves whose distances are compared with a scan: hundredths of a micrometre are nothing beside its noise.
 simulation::SolveOptions accurate_enough();
+/// Of solves far away whose distances are taken as they are, to thousandths of a millimetre.
+simulation::SolveOptions accurate_enough_far_away();
 
 /// F and its slopes at given coordinates. @throws NumericalFailure  no equilibrium
 WeightedFit weigh(calibration::Evaluator& evaluator, const calibration::FreeParameters& parameters,

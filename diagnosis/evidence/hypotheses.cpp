@@ -204,7 +204,7 @@ void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, 
     if (std::abs(rest) < least_rest * std::abs(usual)) return;
     model.effects.back().parameters[row->name].value = row->null + rest;
     try {
-      calibration::Evaluator evaluator(scene, model, accurate_enough());
+      calibration::Evaluator evaluator(scene, model, accurate_enough_far_away());
       const calibration::TrialLimit limit(evaluator.chain(), dearest);
       calibration::Prediction moved = evaluator.predict(model, &at.fit.prediction.solution);
       const auto there = calibration::residuals_of(scene, moved, at.fit.mask, base.noise_mm);

@@ -116,6 +116,31 @@ TEST(NumericalError, DoesNotDependOnWhereTheSolutionIsLookedForFrom) {
   EXPECT_LT(rms(alone.finer_mm - followed.finer_mm), 0.002);
 }
 
+calibration::Fit fit_at(const calibration::MeasuredScene& scene, const simulation::Model& model) {
+  calibration::Evaluator evaluator(scene, model);
+  const calibration::FreeParameters parameters(model);
+  calibration::FitOptions options;
+  options.noise_mm = {0.05};
+  return calibration::evaluate_fit(evaluator, parameters, options, parameters.start());
+}
+
+TEST(NumericalError, OfQuadraticElementsIsFollowedOnTheSameMeshes) {
+  const Twin twin(LinearOfQuadratic::quadratic_twin());
+  const calibration::MeasuredScene scene = twin.scene();
+  simulation::Model stiffer = twin_truth();
+  stiffer.breast.young_modulus_kpa.value *= 1.3;
+  const calibration::Fit fit = fit_at(scene, stiffer);
+  const NumericalError near = measure_numerical_error(scene, twin_truth(), fit_at(scene, twin_truth()));
+  const NumericalError alone = measure_numerical_error(scene, stiffer, fit);
+  const NumericalError followed = measure_numerical_error(scene, stiffer, fit, &near);
+  ASSERT_EQ(followed.finer_failure + followed.coarser_failure, "");
+  EXPECT_EQ(followed.on_finer.mesh, near.on_finer.mesh);
+  EXPECT_EQ(followed.on_coarser.mesh, near.on_coarser.mesh);
+  EXPECT_LT(rms(alone.finer_mm - followed.finer_mm), 0.005);
+  EXPECT_LT(rms(alone.coarser_mm - followed.coarser_mm), 0.005);
+  EXPECT_GT(rms(alone.coarser_mm), 0.02) << "there is something to follow";
+}
+
 TEST(NumericalError, IsTakenToBeLargeWhereNoMeshGivesAnAnswer) {
   const Fitted f;
   meshing::TetMesh crossed = f.twin.mesh;  // its nipple pulled through its muscle: no surface to fill anew
