@@ -149,6 +149,9 @@ void add_facts(const Json& diagnosis, const Collected& collected, const char* bo
                                        diagnosis["unexplained95"][0].get<double>(),
                                        diagnosis["unexplained95"][1].get<double>()));
   for (const Json& place : diagnosis.value("registration", Json::array())) answer.facts.push_back(place_of_scan(place));
+  if (const double creased = number(diagnosis, "creased_points"); creased > 0)
+    answer.facts.push_back(
+        fmt::format("{:.0f} points of the scans lie where the model's skin creases; they count for little.", creased));
   // Where something is missing these may have stood in for it.
   const std::string verdict = diagnosis.value("verdict", "");
   if (verdict != "missing" && verdict != "ambiguous")

@@ -140,6 +140,12 @@ async function check_slices(page) {
   assert.equal(await page.evaluate("[0, 40, 60, 80, 255].map((b) => supine.slice_view.shade(b)).join()"), "0,0,127.5,255,255");
 }
 
+async function check_facts(page) {
+  const words = await page.evaluate("document.body.innerText");
+  for (const fact of ["The supine scan lies 2.3 mm and 0.5° from where it was said to lie.", "361 points of the scans lie where the model's skin creases", "This scan could not show: creep."])
+    assert.ok(words.includes(fact), `not said: ${fact}`);
+}
+
 const browser = await Browser.start(chromium);
 try {
   const calm = { "prefers-reduced-motion": "reduce" };
@@ -149,6 +155,7 @@ try {
   console.log(`first picture: ${busy.toFixed(2)} s of processor time, ${first.toFixed(2)} s by the clock (software rendering)`);
   assert.ok(busy < 3, `the first picture takes ${busy} s`);
   await check_figures(page);
+  if (bin !== "--page") await check_facts(page);
   await check_downloads(page);
   await check_layout(page, 1280);
   await picture(page, "wide", { whole: true });

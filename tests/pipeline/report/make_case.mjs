@@ -22,7 +22,7 @@ const diagnosis = { verdict: "missing", missing: ["ligament"], why: "probability
     { effects: [], probability: 0.01, refitted: true, unexplained_mm: 1.9, unexplained95: [1.6, 2.3] }],
   unexplained_mm: 0.5, unexplained95: [0.3, 0.8],
   registration: [{ pose: "supine", shift_mm: [1, -2, 0.5], turn_deg: [0.2, 0.1, -0.4], sd: [0.4, 0.4, 0.4, 0.2, 0.2, 0.2] }],
-  base_mae_mm: 1.7, base_rms_mm: 2.1, base_held_out_rms_mm: 2.3,
+  creased_points: 361, base_mae_mm: 1.7, base_rms_mm: 2.1, base_held_out_rms_mm: 2.3,
   budget_mm: { total: 2.1, noise: 0.7, registration: 0.3, numerical: 0.4, parameters: 0.1, patchiness: 0.5, model_form: 0.5 },
   hot_spots: [{ area: "upper inner", pose: "supine", area_cm2: 30.5, mean_signed_mm: -1.25, centre_mm: [10, -20, 20] }],
   cannot_see: [{ effect: "creep", power: 0.07 }],
