@@ -41,7 +41,7 @@ def make(binaries, case, answer, out, diagnose):
             table.writerows([t["name"], *t["prone_mm"]] for t in answer["targets"])
         asked = ["--points", out / "asked.csv"]
     if diagnose:
-        run(binaries, "diagnose", case, out / "mesh.vtu", "-o", out)
+        run(binaries, "diagnose", case, out / "mesh.vtu", "--model", case / "model.toml", "-o", out)
         asked += ["--diagnosis", out / "diagnosis.json"]
     run(binaries, "targets", case, out / "mesh.vtu", *asked, "--pose", POSE, "--no-further-scans", "-o", out / "targets")
 

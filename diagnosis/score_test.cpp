@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "calibration/held_out.h"
@@ -177,6 +178,19 @@ class Scorer {
 double expected_ln_factor(double noncentrality, int freedom) {
   const double q = std::max(freedom, 1);
   return 0.5 * (noncentrality - q * std::log1p(noncentrality / q));
+}
+
+double size_that_reaches(double ln_factor, double share, double noncentrality, int freedom) {
+  if (!(noncentrality > 0)) return std::numeric_limits<double>::infinity();
+  const double q = std::max(freedom, 1), width = noncentrality / q;
+  const double least = std::max(0.0, (2 * ln_factor + q * std::log1p(width)) * (1 + width) / width);
+  double low = 0, high = 1;
+  while (chi_squared_power(freedom, high * high, least) < share) high *= 2;
+  for (int halving = 0; halving < 50; ++halving) {
+    const double middle = 0.5 * (low + high);
+    (chi_squared_power(freedom, middle * middle, least) < share ? low : high) = middle;
+  }
+  return high / std::sqrt(noncentrality);
 }
 
 bool settles(double noncentrality, int freedom) {

@@ -55,6 +55,12 @@ double expected_ln_factor(double noncentrality, int freedom);
 /// Whether that is ln of a factor that settles.
 bool settles(double noncentrality, int freedom);
 
+/// How many times its typical size an effect has to be for its evidence to reach a Bayes factor in a share of all
+/// scans, nothing else missing: with T = χ²_q(a² λ), that a for which ½ T / (1 + q/λ) − ½ q ln(1 + λ/q) ≥ ln_factor so
+/// often. Infinite where λ = 0.
+/// @param share  of the scans, in (0, 1)
+double size_that_reaches(double ln_factor, double share, double noncentrality, int freedom);
+
 /// Effects that the scan could not settle if they were there at their typical size.
 std::vector<std::string> unsettled(const ScoreTable& table);
 

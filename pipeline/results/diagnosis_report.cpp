@@ -11,6 +11,7 @@
 #include "diagnosis/diagnosis_file.h"
 #include "diagnosis/evidence/nuisance_words.h"
 #include "diagnosis/over_sets.h"
+#include "diagnosis/size_named.h"
 #include "simulation/parameters.h"
 
 namespace supine::pipeline {
@@ -70,6 +71,8 @@ Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, 
   return list;
 }
 
+Json finite_json(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
 Json candidate_json(const Findings& found, const Score& score) {
   const Refit* refit = refit_of(found, score.effect);
   return {{"effect", score.effect},
@@ -88,7 +91,9 @@ Json candidate_json(const Findings& found, const Score& score) {
           {"beyond_range", score.beyond_range},
           {"predicted_held_out_rms_mm", score.predicted_held_out_rms_mm},
           {"noncentrality", score.noncentrality},
-          {"power", score.power}};
+          {"power", score.power},
+          {"named_half_at", finite_json(diagnosis::size_named(found, score, 0.5))},
+          {"named_mostly_at", finite_json(diagnosis::size_named(found, score, 0.9))}};
 }
 
 Json names_of(const Findings& found, const diagnosis::Hypothesis& h) {

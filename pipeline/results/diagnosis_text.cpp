@@ -7,6 +7,7 @@
 
 #include "diagnosis/evidence/nuisance_words.h"
 #include "diagnosis/over_sets.h"
+#include "diagnosis/size_named.h"
 #include "pipeline/results/diagnosis_report.h"
 
 namespace supine::pipeline {
@@ -150,6 +151,14 @@ std::string made_up_in_words(const diagnosis::StandIn& stand_in) {
   return joined(words, ", ");
 }
 
+/// "creep (x 3.1)": how many times its usual size would be named every other time.
+std::string with_size(const Findings& found, const std::string& effect) {
+  for (const diagnosis::Score& score : found.table.scores)
+    if (const double size = diagnosis::size_named(found, score, 0.5); score.effect == effect && size < 100)
+      return fmt::format("{} (x {:.2g})", effect, size);
+  return effect;
+}
+
 void say_limits(const Run& run, const DiagnosisResult& result) {
   const Findings& found = *result.found;
   std::vector<std::string> blind = diagnosis::not_seen(found);
@@ -159,8 +168,10 @@ void say_limits(const Run& run, const DiagnosisResult& result) {
     run.say((found.diagnosis.verdict == Verdict::missing ? "  and perhaps: "
                                                          : "  expected, looked for, and not excluded: ") +
             joined(found.diagnosis.ambiguous_rest, " or "));
-  run.say(fmt::format("  could not be seen with this scan: {}",
-                      blind.empty() ? "none" : fmt::format("{}", fmt::join(blind, ", "))));
+  std::vector<std::string> sized;
+  for (const std::string& effect : blind) sized.push_back(with_size(found, effect));
+  run.say("  could not be seen with this scan: " +
+          (blind.empty() ? "none" : joined(sized, ", ") + " (x: of its usual size would be named every other time)"));
   for (const diagnosis::Candidate& candidate : found.candidates)
     if (candidate.stand_in && std::find(blind.begin(), blind.end(), candidate.effect) != blind.end() &&
         found.priors.is_expected(candidate.effect))

@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "common/error.h"
@@ -196,6 +197,26 @@ TEST(ScoreTest, FactorToBeExpectedIsTheMeanOverScansThatHaveTheEffect) {
     sum += 0.5 * (z * z - z * z / wide - std::log(wide));
   }
   EXPECT_NEAR(score_of(table, "wave").expected_ln_factor, sum / draws, 0.02);
+}
+
+TEST(ScoreTest, SizeThatIsNamedIsNamedInTheShareOfScansThatItIsFor) {
+  constexpr double ln_factor = 6.3, lambda = 4;
+  std::mt19937_64 generator(5);
+  std::normal_distribution<double> normal;
+  for (const int q : {1, 3})
+    for (const double share : {0.5, 0.9}) {
+      const double size = size_that_reaches(ln_factor, share, lambda, q), width = 1 + lambda / q;
+      EXPECT_GT(size, 1);
+      int named = 0;
+      constexpr int draws = 40000;
+      for (int k = 0; k < draws; ++k) {
+        double square = 0;
+        for (int i = 0; i < q; ++i) square += std::pow(normal(generator) + (i == 0 ? size * std::sqrt(lambda) : 0), 2);
+        named += 0.5 * (square - square / width - q * std::log(width)) > ln_factor;
+      }
+      EXPECT_NEAR(named / static_cast<double>(draws), share, 0.012) << q;
+    }
+  EXPECT_EQ(size_that_reaches(ln_factor, 0.5, 0, 1), std::numeric_limits<double>::infinity());
 }
 
 TEST(ScoreTest, ChiSquaredTailsAreThoseOfTheTables) {
