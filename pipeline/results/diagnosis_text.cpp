@@ -170,8 +170,8 @@ void say_limits(const Run& run, const DiagnosisResult& result) {
             joined(found.diagnosis.ambiguous_rest, " or "));
   std::vector<std::string> sized;
   for (const std::string& effect : blind) sized.push_back(with_size(found, effect));
-  run.say("  could not be seen with this scan: " +
-          (blind.empty() ? "none" : joined(sized, ", ") + " (x: of its usual size would be named every other time)"));
+  run.say("  could not be seen with this scan" +
+          (blind.empty() ? ": none" : " (x: of the usual size, named every other time): " + joined(sized, ", ")));
   for (const diagnosis::Candidate& candidate : found.candidates)
     if (candidate.stand_in && std::find(blind.begin(), blind.end(), candidate.effect) != blind.end() &&
         found.priors.is_expected(candidate.effect))
