@@ -39,7 +39,7 @@ struct StandIn {
 /// leave less than half of what the first leave, free parameters are fitted until the points lie where the base model
 /// has them, nuisances and discrepancy as errors. Of an effect that the case expects no lines are asked, and the others
 /// that it expects are free too. Of a number of either sign the one that is seen less counts. Where the
-/// chain finds no equilibrium none is filled.
+/// chain finds no equilibrium, or none that costs as little as the dearest of the base fit, none is filled.
 void find_stand_ins(const calibration::MeasuredScene& scene, const BaseFit& base, const FitErrors& errors,
                     const Priors& priors, std::vector<Candidate>& candidates);
 
