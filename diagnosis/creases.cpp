@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration/model_skin.h"
+#include "meshing/tetrahedra/tetrahedralise.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -24,13 +25,6 @@ Points middles(const Triangles& triangles, const Points& points) {
   for (Eigen::Index t = 0; t < triangles.rows(); ++t)
     all.row(t) = points(triangles.row(t), Eigen::all).colwise().mean();
   return all;
-}
-
-double mean_edge(const Triangles& triangles, const Points& points) {
-  double sum = 0;
-  for (Eigen::Index t = 0; t < triangles.rows(); ++t)
-    for (int k = 0; k < 3; ++k) sum += (points.row(triangles(t, k)) - points.row(triangles(t, (k + 1) % 3))).norm();
-  return sum / static_cast<double>(3 * triangles.rows());
 }
 
 }  // namespace
@@ -52,7 +46,7 @@ CreaseError crease_error(const calibration::MeasuredScene& scene, const calibrat
   constexpr double share_of_edge = 1.0 / 3, edges_alike = 2;
   const Points& undeformed = prediction.solution.X;
   const Triangles triangles = calibration::ModelSkin(*scene.mesh, undeformed).triangles();
-  const double edge_mm = mean_edge(triangles, undeformed);
+  const double edge_mm = meshing::mean_edge_mm({undeformed, triangles, {}});
   CreaseError error{Eigen::VectorXd::Zero(residuals.size()), edges_alike * edge_mm, 0};
   for (std::size_t m = 0; m < prediction.poses.size(); ++m) {
     const Points& x = prediction.solution.poses[m].x;

@@ -167,8 +167,8 @@ void measure_on_coarse(const calibration::MeasuredScene& scene, const simulation
   result.coarse =
       known ? near->coarse
             : std::make_shared<const meshing::TetMesh>(coarser_mesh(*scene.mesh, *scene.anatomy, few_triangles_share));
-  calibration::Prediction linear =
-      predicted_on(scene, *result.coarse, model, known ? &near->linear : nullptr, enough());
+  calibration::Prediction linear = predicted_on(scene, *result.coarse, model,
+                                                known && near->linear.X.rows() > 0 ? &near->linear : nullptr, enough());
   const Eigen::VectorXd given = fit.residuals.distance_mm, l = distances_of(fit.residuals, linear);
   result.linear = std::move(linear.solution);
   result.coarser_mm = change(given, l);
@@ -207,15 +207,17 @@ simulation::ChainSolution carried(const simulation::ChainSolution& solution, con
 }
 
 /// What another mesh changes, and the model on it.
-/// @param near  the same of a similar model; nullptr, or without a mesh: that is the one that @p make makes
+/// @param near  the same of a similar model: its mesh, in place of the one that @p make makes, and where to start from.
+///   Either may be missing: the mesh was not made, or the model had no equilibrium on it
 template <class Make>
 Eigen::VectorXd change_on(const calibration::MeasuredScene& scene, const simulation::Model& model,
                           const calibration::Fit& fit, const NumericalError::OnOther* near, Make make,
                           NumericalError::OnOther& result) {
   const bool known = near != nullptr && near->mesh;
   result.mesh = known ? near->mesh : std::make_shared<const meshing::TetMesh>(make());
-  const simulation::ChainSolution start =
-      known ? near->solution : carried(fit.prediction.solution, *scene.mesh, *result.mesh);
+  const simulation::ChainSolution start = known && near->solution.X.rows() > 0
+                                              ? near->solution
+                                              : carried(fit.prediction.solution, *scene.mesh, *result.mesh);
   calibration::Prediction there = predicted_on(scene, *result.mesh, model, &start, enough());
   result.solution = std::move(there.solution);
   return change(fit.residuals.distance_mm, distances_of(fit.residuals, there));

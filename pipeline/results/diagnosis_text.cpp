@@ -153,9 +153,11 @@ std::string made_up_in_words(const diagnosis::StandIn& stand_in) {
 
 /// "creep (x 3.1)": how many times its usual size would be named every other time.
 std::string with_size(const Findings& found, const std::string& effect) {
-  for (const diagnosis::Score& score : found.table.scores)
-    if (const double size = diagnosis::size_named(found, score, 0.5); score.effect == effect && size < 100)
+  for (const diagnosis::Score& score : found.table.scores) {
+    if (score.effect != effect) continue;
+    if (const double size = diagnosis::size_named(found, score, 0.5); size < 100)
       return fmt::format("{} (x {:.2g})", effect, size);
+  }
   return effect;
 }
 

@@ -139,6 +139,11 @@ TEST(NumericalError, OfQuadraticElementsIsFollowedOnTheSameMeshes) {
   EXPECT_LT(rms(alone.finer_mm - followed.finer_mm), 0.005);
   EXPECT_LT(rms(alone.coarser_mm - followed.coarser_mm), 0.005);
   EXPECT_GT(rms(alone.coarser_mm), 0.02) << "there is something to follow";
+  NumericalError unsolved;  // there was no equilibrium on the mesh before
+  unsolved.on_coarser.mesh = near.on_coarser.mesh;
+  const NumericalError solved = measure_numerical_error(scene, stiffer, fit, &unsolved);
+  EXPECT_EQ(solved.coarser_failure, "");
+  EXPECT_LT(rms(alone.coarser_mm - solved.coarser_mm), 0.005);
 }
 
 TEST(NumericalError, IsTakenToBeLargeWhereNoMeshGivesAnAnswer) {
