@@ -32,22 +32,15 @@ const Hypothesis& nothing_of(const Findings& found) {
 /// What was left out, predicted by the likeliest hypothesis with an effect beside the same without it.
 void ask_what_was_left_out(const Subject& subject, Findings& found) {
   std::vector<LeftOut> parts;
+  const auto names = found.effects();
   for (Inclusion& one : found.included) {
     if (one.probability < found.priors.named_at) break;
     if (parts.empty()) parts = left_out_parts(subject.scene, found.base);
-    const auto names = found.effects();
     const int effect = static_cast<int>(std::find(names.begin(), names.end(), one.effect) - names.begin());
-    const auto has = [](const Hypothesis& h, int e) {
-      return std::find(h.effects.begin(), h.effects.end(), e) != h.effects.end();
-    };
-    const auto with = std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
-                                   [&](const Hypothesis& h) { return has(h, effect); });
-    std::vector<int> others = with->effects;
-    std::erase(others, effect);
-    const auto without = std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
-                                      [&](const Hypothesis& h) { return h.effects == others; });
-    const Hypothesis& less = without == found.hypotheses.end() ? nothing_of(found) : *without;
-    for (const LeftOut& part : parts) one.left_out_gain += left_out_gain(found.base, *with, less, part);
+    const auto before = std::find_if(found.beside.begin(), found.beside.end(),
+                                     [effect](const Findings::Beside& b) { return b.surest == effect; });
+    one.left_out_gain =
+        before != found.beside.end() ? before->left_out_gain : left_out_gain_of(found.hypotheses, effect, parts);
   }
 }
 
@@ -137,6 +130,13 @@ std::vector<std::string> Findings::effects() const {
   return names;
 }
 
+std::vector<std::string> Findings::errors_beside() const {
+  std::vector<std::string> names;
+  if (!beside.empty())
+    for (const int effect : beside.back().effects) names.push_back(candidates[static_cast<std::size_t>(effect)].effect);
+  return names;
+}
+
 const Refit* Findings::refit_of(const std::vector<std::string>& wanted) const {
   const std::set<std::string> set(wanted.begin(), wanted.end());
   for (const Refit& refit : refits)
@@ -171,7 +171,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   found->budget = error_budget(*found);
   found->diagnosis = decide(found->hypotheses, found->effects(), found->included, found->unexplained, options.priors,
                             unsettled(found->table));
-  found->under_other_priors = under_other_priors(found->base, found->hypotheses, found->effects(), found->included,
+  found->under_other_priors = under_other_priors(found->hypotheses, found->effects(), found->included,
                                                  found->unexplained, options.priors, unsettled(found->table));
   if (found->diagnosis.verdict == Verdict::unexplained) {
     tell(options, "map of missing forces");

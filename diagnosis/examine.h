@@ -49,10 +49,19 @@ struct Findings {
   BaseFit base;                            ///< a model that lacks nothing
   double rms_mm = 0, held_out_rms_mm = 0;  ///< of it
   std::vector<Candidate> candidates;
-  std::vector<std::string> unseen;          ///< effects that move no fitted point, here or anywhere
-  std::optional<FitErrors> errors;          ///< of the base model, nuisances and the likeliest discrepancy among them
-  ScoreTable table;                         ///< information: what each effect's score says by itself
-  std::vector<Hypothesis> hypotheses;       ///< most probable first
+  std::vector<std::string> unseen;     ///< effects that move no fitted point, here or anywhere
+  std::optional<FitErrors> errors;     ///< of the base model, nuisances and the likeliest discrepancy among them
+  ScoreTable table;                    ///< information: what each effect's score says by itself
+  std::vector<Hypothesis> hypotheses;  ///< most probable first
+  /// Errors measured anew beside effects that are sure, for all that holds them (follow.h).
+  struct Beside {
+    std::vector<int> effects;  ///< rows of the candidates, ascending
+    std::unique_ptr<BaseFit> ground;
+    int surest = -1;           ///< of them, that the one before does not hold
+    double ln_odds = 0;        ///< that a set holds them, as they were
+    double left_out_gain = 0;  ///< of the surest, as it was
+  };
+  std::vector<Beside> beside;               ///< each holds those before it
   std::vector<Refit> refits;                ///< of some of them, the likelier first
   std::vector<Inclusion> included;          ///< most probable first
   Unexplained unexplained;                  ///< over all hypotheses
@@ -75,6 +84,7 @@ struct Findings {
   /// The most probable, and always "nothing", with what each leaves unexplained.
   std::vector<std::pair<const Hypothesis*, Unexplained>> told() const;
   std::vector<std::string> effects() const;                              ///< of the candidates
+  std::vector<std::string> errors_beside() const;                        ///< that errors were last measured beside
   const Refit* refit_of(const std::vector<std::string>& effects) const;  ///< of that set; nullptr where there is none
 };
 

@@ -5,20 +5,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/error.h"
+#include "diagnosis/evidence/left_out.h"
+#include "diagnosis/next_set.h"
 
 namespace supine::diagnosis {
 namespace {
 
-constexpr double worth_refitting = 0.01;  // screened probability
-constexpr double worth_going_on = 0.1;    // the same of what holds more than a likeliest set that was followed
-constexpr double held_by_refits = 0.99;   // of the screened probability
-constexpr double stands_out = 0.05;       // inclusion from which more than two sets are followed
+constexpr double worth_going_on = 0.1;  // the same of what holds more than a likeliest set that was followed
+constexpr double stands_out = 0.05;     // inclusion from which more than two sets are followed
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
 constexpr double cost_of_an_idle_effect = 1;  // ln evidence, by and large
 constexpr std::size_t singles_to_draw_from = 3, most_further = 8, most_where_lines_bend = 6;  // the last: times refits
 constexpr std::size_t most_on_from_first = 5;
+constexpr double likelier_than_not = 0.5;
 
 /// Effects that appear in what is screened with at least some probability.
 bool something_stands_out(const Findings& found) {
@@ -27,39 +29,16 @@ bool something_stands_out(const Findings& found) {
   return false;
 }
 
-bool is_open(const Hypothesis& h) { return !h.effects.empty() && !h.refitted && !h.unsolved; }
-
-bool is_part_of(const Hypothesis& part, const Hypothesis& whole) {
-  return std::includes(whole.effects.begin(), whole.effects.end(), part.effects.begin(), part.effects.end());
-}
-
-/// The next hypothesis that should be followed through the chain, or nullptr.
-/// @param least_with_first  probability of one that holds more than the likeliest and all of it
-const Hypothesis* next_to_refit(const std::vector<Hypothesis>& hypotheses, double least_with_first = worth_refitting) {
-  double sum = 0;
-  for (const Hypothesis& h : hypotheses) {
-    const double least = is_part_of(hypotheses.front(), h) ? least_with_first : worth_refitting;
-    if (is_open(h) && h.probability >= least) return &h;
-    sum += h.probability;
-    if (sum >= held_by_refits) break;
-  }
-  return nullptr;
-}
-
-/// The likeliest hypothesis less one effect, not followed yet; nullptr where there is none. Straight lines do the
-/// simpler one wrong beside one that was followed.
-const Hypothesis* simpler_than_first(const std::vector<Hypothesis>& hypotheses) {
-  const Hypothesis& first = hypotheses.front();
-  if (!first.refitted || first.effects.size() < 2) return nullptr;
-  const auto found = std::find_if(hypotheses.begin(), hypotheses.end(), [&first](const Hypothesis& h) {
-    return is_open(h) && h.effects.size() + 1 == first.effects.size() && is_part_of(h, first);
-  });
-  return found == hypotheses.end() ? nullptr : &*found;
-}
-
 Hypothesis& hypothesis_of(Findings& found, const std::vector<int>& effects) {
   return *std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
                        [&effects](const Hypothesis& h) { return h.effects == effects; });
+}
+
+double log_sum(const std::vector<double>& logs) {
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double sum = 0;
+  for (const double one : logs) sum += std::exp(one - most);
+  return most + std::log(sum);
 }
 
 class Follower {
@@ -68,6 +47,7 @@ class Follower {
       : subject_(subject), options_(options), found_(found) {}
 
   void run() {
+    if (options_.refits > 0) look_from_usual_sizes();
     if (options_.refits > 0) follow_expected();
     auto most = static_cast<std::size_t>(options_.refits);
     if (!something_stands_out(found_)) most = std::min(most, refits_when_quiet);
@@ -80,6 +60,8 @@ class Follower {
     }
     if (!bent_ && most > 0) on_from_first();
     if (bent_) one_at_a_time();
+    for (std::vector<int> part = surest_part(); most > 0 && !part.empty(); part = surest_part())
+      if (!look_again_beside(part)) break;
   }
 
  private:
@@ -89,19 +71,61 @@ class Follower {
     if (options_.progress) options_.progress(fmt::format("{} {}", what, fmt::join(names, " and ")));
   }
 
+  /// Whose errors a set is weighed under: those beside the most of it that they were measured beside.
+  const BaseFit& ground_of(const std::vector<int>& effects) const {
+    for (auto beside = found_.beside.rbegin(); beside != found_.beside.rend(); ++beside)
+      if (is_part_of(beside->effects, effects)) return *beside->ground;
+    return found_.base;
+  }
+
+  /// Where something is missing, lines from nothing do not show what a ligament would do.
+  void look_from_usual_sizes() {
+    if (!something_stands_out(found_)) return;
+    if (options_.progress) options_.progress("lines from usual sizes");
+    weigh_from_usual_size(subject_.scene, subject_.given, found_.base, found_.candidates, found_.hypotheses);
+  }
+
+  /// Of prior and evidence under some errors: a set with less is too unlikely to be asked for more.
+  double least_worth(const BaseFit& ground) const {
+    constexpr double hopeless = 10;
+    double most = -std::numeric_limits<double>::infinity();
+    for (const Hypothesis& h : found_.hypotheses)
+      if (h.refitted && h.ground == &ground) most = std::max(most, h.ln_prior + h.ln_evidence);
+    return most - hopeless;
+  }
+
   bool first_holds_an_effect() const { return !found_.hypotheses.front().effects.empty(); }
 
   void weigh() {
     lower_unfollowed(found_.hypotheses);
     if (bent_) hold_to_parts();
+    keep_odds();
     normalise(found_.hypotheses);
+  }
+
+  /// ln of the odds that a set holds a part, under the errors they are weighed under.
+  double ln_odds_of(const std::vector<int>& part) const {
+    std::vector<double> with, without;
+    for (const Hypothesis& h : found_.hypotheses)
+      (is_part_of(part, h.effects) ? with : without).push_back(ln_weight(h));
+    return log_sum(with) - log_sum(without);
+  }
+
+  /// Errors beside a part judge what is beside it, not the part itself: a mesh that errs more beside it would speak
+  /// against it, or for it, by its size alone.
+  void keep_odds() {
+    if (found_.beside.empty()) return;
+    const Findings::Beside& last = found_.beside.back();
+    last.ground->ln_weight += last.ln_odds - ln_odds_of(last.effects);
   }
 
   void follow_one(const std::vector<int> effects) {
     tell("refit with", effects);
     Hypothesis& h = hypothesis_of(found_, effects);
     const JointFit& from = h.drawn_at < 0 ? found_.base : found_.refits[static_cast<std::size_t>(h.drawn_at)].joint;
-    Refit refit = diagnosis::refit(subject_.scene, subject_.given, found_.base, from, found_.candidates, h);
+    const BaseFit& ground = ground_of(effects);
+    Refit refit =
+        diagnosis::refit(subject_.scene, subject_.given, ground, from, found_.candidates, h, least_worth(ground));
     if (refit.solved) {
       const double promised = h.screened;
       h = refit.hypothesis;
@@ -119,7 +143,7 @@ class Follower {
       if (!is_open(h) || h.drawn_at >= 0 || h.effects.size() < 2) continue;
       double best = hypothesis_of(found_, {}).ln_evidence;
       for (const Hypothesis& part : found_.hypotheses)
-        if (part.refitted && is_part_of(part, h)) best = std::max(best, part.ln_evidence);
+        if (part.refitted && is_part_of(part.effects, h.effects)) best = std::max(best, part.ln_evidence);
       h.ln_evidence = std::min(h.ln_evidence, best);
     }
   }
@@ -134,7 +158,7 @@ class Follower {
       calibration::Evaluator evaluator(subject_.scene, refit.joint.model, accurate_enough());
       std::vector<std::string> unfelt;
       further = find_candidates(evaluator, refit.joint.model, refit.joint.fit, unfelt);
-      find_secants(subject_.scene, found_.base, refit.joint, further);
+      find_secants(subject_.scene, ground_of(part.effects), refit.joint, further);
     } catch (const NumericalFailure&) {
       return;  // a shape without slopes
     }
@@ -142,7 +166,7 @@ class Follower {
     std::erase_if(further, [&names](const Candidate& c) {
       return std::find(names.begin(), names.end(), c.effect) == names.end();
     });
-    for (Hypothesis& drawn : screen_beside(found_.base, refit.joint, part, names, further, found_.priors)) {
+    for (Hypothesis& drawn : screen_beside(ground_of(part.effects), refit.joint, part, names, further, found_.priors)) {
       drawn.drawn_at = static_cast<int>(at);
       const auto same = std::find_if(found_.hypotheses.begin(), found_.hypotheses.end(),
                                      [&drawn](const Hypothesis& h) { return h.effects == drawn.effects; });
@@ -188,7 +212,7 @@ class Follower {
     const Hypothesis& first = found_.hypotheses.front();
     const auto found = std::find_if(found_.refits.begin(), found_.refits.end(), [&first](const Refit& refit) {
       const Hypothesis& h = refit.hypothesis;
-      return refit.solved && h.effects.size() == first.effects.size() + 1 && is_part_of(first, h) &&
+      return refit.solved && h.effects.size() == first.effects.size() + 1 && is_part_of(first.effects, h.effects) &&
              h.ln_evidence < first.ln_evidence - cost_of_an_idle_effect;
     });
     return static_cast<std::size_t>(found - found_.refits.begin());
@@ -211,17 +235,23 @@ class Follower {
     weigh();
   }
 
+  /// Lines from the likeliest, where none were drawn yet, and what they promise followed. @return  whether there was
+  /// any
+  bool one_step_on_from_first() {
+    const std::size_t at = first_to_draw_from();
+    if (at < found_.refits.size()) draw_from(at);
+    const Hypothesis* next = next_to_refit(found_.hypotheses, worth_going_on);
+    if (next == nullptr) next = simpler_than_first(found_.hypotheses);
+    if (next == nullptr) return false;
+    follow_one(next->effects);
+    return true;
+  }
+
   /// What stands out was followed; beside it other effects may do more than lines from nothing say: lines are drawn
   /// from it and what they promise is followed.
   void on_from_first() {
-    for (std::size_t further = 0; further < most_on_from_first && !bent_ && first_holds_an_effect(); ++further) {
-      const std::size_t at = first_to_draw_from();
-      if (at < found_.refits.size()) draw_from(at);
-      const Hypothesis* next = next_to_refit(found_.hypotheses, worth_going_on);
-      if (next == nullptr) next = simpler_than_first(found_.hypotheses);
-      if (next == nullptr) break;
-      follow_one(next->effects);
-    }
+    for (std::size_t further = 0; further < most_on_from_first && !bent_ && first_holds_an_effect(); ++further)
+      if (!one_step_on_from_first()) break;
     if (!bent_) again_from_first();
   }
 
@@ -256,6 +286,92 @@ class Follower {
       if (next == nullptr) return;
       follow_one(next->effects);
     }
+  }
+
+  /// ln of what speaks for sets without an effect, up to what is the same for all.
+  double doubt(int effect) const {
+    double most = -std::numeric_limits<double>::infinity();
+    for (const Hypothesis& h : found_.hypotheses)
+      if (!is_part_of({effect}, h.effects)) most = std::max(most, ln_weight(h));
+    return most;
+  }
+
+  /// What would be named by itself, the surest effect of it, where more than it is likelier than not: then errors that
+  /// were measured without it judge what is beside it. Together with what they were measured beside before. Empty where
+  /// there is no such effect, or where nothing more is likely than what they were measured beside.
+  std::vector<int> surest_part() const {
+    std::vector<int> part;
+    if (!found_.beside.empty()) part = found_.beside.back().effects;
+    int next = -1;
+    for (const int e : found_.hypotheses.front().effects)
+      if (std::find(part.begin(), part.end(), e) == part.end() && (next < 0 || doubt(e) < doubt(next))) next = e;
+    if (next < 0 || inclusion(found_.hypotheses, next) < found_.priors.named_at) return {};
+    part.insert(std::upper_bound(part.begin(), part.end(), next), next);
+    double more = 0;
+    for (const Hypothesis& h : found_.hypotheses)
+      if (is_part_of(part, h.effects) && h.effects.size() > part.size()) more += h.probability;
+    return more > likelier_than_not ? part : std::vector<int>{};
+  }
+
+  /// The refit of a set, followed now where it was not; the number of refits where there is none.
+  std::size_t refit_with(const std::vector<int>& effects) {
+    const auto is_it = [&effects](const Refit& r) { return r.solved && r.hypothesis.effects == effects; };
+    auto at = std::find_if(found_.refits.begin(), found_.refits.end(), is_it);
+    const auto known = std::find_if(found_.hypotheses.begin(), found_.hypotheses.end(),
+                                    [&effects](const Hypothesis& h) { return h.effects == effects; });
+    if (at == found_.refits.end() && known != found_.hypotheses.end()) {
+      follow_one(effects);
+      at = std::find_if(found_.refits.begin(), found_.refits.end(), is_it);
+    }
+    return static_cast<std::size_t>(at - found_.refits.begin());
+  }
+
+  /// Sets with @p part, followed again under the last errors where they were likely or are @p part itself; the others
+  /// are forgotten.
+  void follow_again(const std::vector<int>& part) {
+    const BaseFit& ground = *found_.beside.back().ground;
+    for (Refit& refit : found_.refits) {
+      const std::vector<int> effects = refit.hypothesis.effects;
+      if (!refit.solved || !is_part_of(part, effects)) continue;
+      Hypothesis& h = hypothesis_of(found_, effects);
+      if (h.probability >= worth_refitting || effects == part) {
+        tell("again with", effects);
+        refit = refit_again(subject_.scene, ground, refit, found_.candidates, least_worth(ground));
+        h = refit.hypothesis;
+      } else {
+        refit.solved = false;
+      }
+    }
+    std::erase_if(found_.hypotheses,
+                  [&](const Hypothesis& h) { return is_part_of(part, h.effects) && h.ground != &ground; });
+    std::erase_if(drawn_, [&](std::size_t at) { return is_part_of(part, found_.refits[at].hypothesis.effects); });
+    weigh();
+  }
+
+  /// Errors of mesh and body measured beside a set, and all that holds it weighed under these. @return  whether they
+  /// could be measured
+  bool look_again_beside(const std::vector<int>& part) {
+    const std::size_t at = refit_with(part);
+    if (at >= found_.refits.size()) return false;
+    tell("errors of mesh and body beside", part);
+    Findings::Beside beside{part, nullptr, part.front(), ln_odds_of(part), 0};
+    if (!found_.beside.empty())
+      for (const int e : part)
+        if (!is_part_of({e}, found_.beside.back().effects)) beside.surest = e;
+    beside.left_out_gain =
+        left_out_gain_of(found_.hypotheses, beside.surest, left_out_parts(subject_.scene, found_.base));
+    try {
+      beside.ground = ground_beside(subject_.scene, found_.base, found_.refits[at].joint, found_.priors);
+    } catch (const NumericalFailure&) {
+      return false;  // those of the base fit have to do
+    }
+    found_.beside.push_back(std::move(beside));
+    follow_again(part);
+    if (!found_.refits[at].solved) return true;
+    draw_from(at);
+    for (std::size_t further = 0; further < most_on_from_first; ++further)
+      if (!one_step_on_from_first()) break;
+    return true;
   }
 
   const Subject& subject_;

@@ -12,6 +12,11 @@ namespace supine::diagnosis {
 /// are found one effect at a time instead: every effect is followed by itself, and lines are drawn again from the
 /// likeliest of these, and from each set that comes out first. A set that no new line was drawn to counts as its best
 /// part.
+///
+/// Errors of mesh and body are those of a model that lacks nothing. Where one effect is sure and more beside it is
+/// likelier than not, they are measured anew beside that effect, and whatever holds it is weighed under these: what a
+/// tied breast shows that an untied one does not must not count for a second effect. With two that are sure again, for
+/// a third.
 void follow(const Subject& subject, const ExamineOptions& options, Findings& found);
 
 }  // namespace supine::diagnosis

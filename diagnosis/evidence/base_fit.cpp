@@ -226,4 +226,24 @@ BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, con
   return base;
 }
 
+std::unique_ptr<BaseFit> ground_beside(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& at,
+                                       const Priors& priors) {
+  auto ground = std::make_unique<BaseFit>();
+  static_cast<JointFit&>(*ground) = at;
+  ground->fit.mask = base.fit.mask;
+  ground->noise_mm = base.noise_mm;
+  ground->clusters = base.clusters;
+  Evaluator evaluator(scene, at.model, accurate_enough());
+  if (base.numerical) {
+    NumericalError meshes;  // without solutions: those are of a model that lacks the effects
+    meshes.coarse = base.numerical->coarse;
+    meshes.on_finer.mesh = base.numerical->on_finer.mesh;
+    meshes.on_coarser.mesh = base.numerical->on_coarser.mesh;
+    ground->numerical = measure_numerical_error(scene, ground->model, ground->fit, &meshes);
+  }
+  JointFitter fitter(evaluator, *ground, *ground);
+  find_errors(evaluator, *fitter.linearise(), priors, *ground);
+  return ground;
+}
+
 }  // namespace supine::diagnosis

@@ -33,6 +33,7 @@ struct BaseFit : JointFit {
   double scale_mm = 0, most_mm = 0;             ///< of the prior of the discrepancy's size
   Eigen::Index creased_points = 0;              ///< of the scans, over creases of the model's skin (creases.h)
   std::optional<NumericalError> numerical;      ///< none: the mesh is taken to be exact
+  double ln_weight = 0;                         ///< of all that is weighed under these errors (follow.h)
 
   /// Distances over the clusters, the mesh's error taken away.
   Eigen::VectorXd distances(const calibration::Residuals& residuals) const;
@@ -66,5 +67,13 @@ struct BaseFitOptions {
 BaseFit fit_base_model(calibration::Evaluator& evaluator, const simulation::Model& given,
                        const simulation::Model& start, const std::vector<double>& noise_mm,
                        const simulation::ChainSolution* near, const BaseFitOptions& options);
+
+/// What stands in every hypothesis that holds some effects: errors of mesh and body as they are beside these, over the
+/// clusters of the base fit. They were measured where nothing is added to the model; a ligament that ties a breast
+/// changes what another mesh or uneven tissue do to it.
+/// @param at  a fit of the model with these effects
+/// @throws NumericalFailure  no sensitivities there
+std::unique_ptr<BaseFit> ground_beside(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& at,
+                                       const Priors& priors);
 
 }  // namespace supine::diagnosis

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <set>
 
@@ -69,11 +70,11 @@ std::vector<int> first_rows(Eigen::Index count) {
   return rows;
 }
 
-bool is_part_of(const Hypothesis& part, const Hypothesis& whole) {
-  return std::includes(whole.effects.begin(), whole.effects.end(), part.effects.begin(), part.effects.end());
-}
-
 }  // namespace
+
+bool is_part_of(const std::vector<int>& part, const std::vector<int>& whole) {
+  return std::includes(whole.begin(), whole.end(), part.begin(), part.end());
+}
 
 int Hypothesis::place_of(const std::string& name) const {
   const auto& names = evidence->directions().names;
@@ -84,27 +85,36 @@ int Hypothesis::place_of(const std::string& name) const {
 
 void lower_unfollowed(std::vector<Hypothesis>& hypotheses) {
   constexpr double none = std::numeric_limits<double>::infinity();
-  double nothing = -none, least[2] = {none, none};  // from the base fit, from refits
+  double least[2] = {none, none};             // from the base fit, from refits
+  std::map<const BaseFit*, double> simplest;  // evidence of the smallest set that was followed under each ground
+  std::map<const BaseFit*, std::size_t> size;
   for (const Hypothesis& h : hypotheses) {
     double& own = least[h.drawn_at < 0 ? 0 : 1];
-    if (h.refitted) own = std::min(own, h.screened - h.ln_evidence);
-    if (h.effects.empty()) nothing = h.ln_evidence;
+    if (h.refitted && !h.again) own = std::min(own, h.screened - h.ln_evidence);
+    if (!h.effects.empty() && !h.refitted) continue;
+    const auto at = size.try_emplace(h.ground, h.effects.size()).first;
+    if (h.effects.size() <= at->second) at->second = h.effects.size(), simplest[h.ground] = h.ln_evidence;
   }
   for (Hypothesis& h : hypotheses) {
     const double own = least[h.drawn_at < 0 ? 0 : 1];
     if (h.refitted || h.effects.empty() || !std::isfinite(own)) continue;
     double fall = std::max(own, 0.0);
     for (const Hypothesis& part : hypotheses)
-      if (h.drawn_at < 0 && part.drawn_at < 0 && part.refitted && is_part_of(part, h))
+      if (h.drawn_at < 0 && part.drawn_at < 0 && part.refitted && !part.again && is_part_of(part.effects, h.effects))
         fall = std::max(fall, part.screened - part.ln_evidence);
-    h.ln_evidence = std::max(h.screened - fall, std::min(h.screened, nothing));
+    const auto floor = simplest.find(h.ground);
+    h.ln_evidence = std::max(h.screened - fall, floor == simplest.end() ? -none : std::min(h.screened, floor->second));
   }
+}
+
+double ln_weight(const Hypothesis& h) {
+  return h.ln_prior + h.ln_evidence + (h.ground != nullptr ? h.ground->ln_weight : 0);
 }
 
 void normalise(std::vector<Hypothesis>& hypotheses) {
   double most = -1e300, sum = 0;
-  for (const Hypothesis& h : hypotheses) most = std::max(most, h.ln_prior + h.ln_evidence);
-  for (Hypothesis& h : hypotheses) sum += h.probability = std::exp(h.ln_prior + h.ln_evidence - most);
+  for (const Hypothesis& h : hypotheses) most = std::max(most, ln_weight(h));
+  for (Hypothesis& h : hypotheses) sum += h.probability = std::exp(ln_weight(h) - most);
   for (Hypothesis& h : hypotheses) h.probability /= sum;
   std::stable_sort(hypotheses.begin(), hypotheses.end(),
                    [](const Hypothesis& a, const Hypothesis& b) { return a.probability > b.probability; });
@@ -118,7 +128,7 @@ double inclusion(const std::vector<Hypothesis>& hypotheses, int effect) {
 }
 
 Screening::Screening(const BaseFit& base, const std::vector<Candidate>& candidates, const Priors& priors)
-    : priors_(priors) {
+    : priors_(priors), base_(base) {
   Directions all = directions_at(base.fit, *base.parameters, base.nuisances, base.clusters);
   base_rows_ = first_rows(all.size());
   for (const Candidate& candidate : candidates) {
@@ -159,20 +169,21 @@ Hypothesis Screening::weigh(std::vector<int> effects) const {
   }
   h.effects = std::move(effects);
   h.evidence = evidence_;
+  h.ground = &base_;
   h.weighed = evidence_->weigh(h.rows);
   h.ln_evidence = h.screened = h.weighed.ln_evidence;
   return h;
 }
 
-std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, const Hypothesis& part,
+std::vector<Hypothesis> screen_beside(const BaseFit& ground, const JointFit& at, const Hypothesis& part,
                                       const std::vector<std::string>& effects, const std::vector<Candidate>& further,
                                       const Priors& priors) {
-  Directions all = directions_at(at.fit, *at.parameters, at.nuisances, base.clusters);
+  Directions all = directions_at(at.fit, *at.parameters, at.nuisances, ground.clusters);
   const std::vector<int> own = first_rows(all.size());
   std::vector<std::vector<int>> rows;
-  for (const Candidate& candidate : further) rows.push_back(add_candidate(base, at, candidate, all));
+  for (const Candidate& candidate : further) rows.push_back(add_candidate(ground, at, candidate, all));
   const auto evidence =
-      std::make_shared<LinearEvidence>(*base.covariance, base.distances(at.fit.residuals), std::move(all));
+      std::make_shared<LinearEvidence>(*ground.covariance, ground.distances(at.fit.residuals), std::move(all));
   std::vector<Hypothesis> list;
   for (std::size_t c = 0; c < further.size(); ++c) {
     Hypothesis h;
@@ -183,6 +194,7 @@ std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, c
     h.ln_prior = priors.ln_of_set(effects, h.effects);
     h.rows = exchanged(own, replaced_by(at, further[c].effect), rows[c]);
     h.evidence = evidence;
+    h.ground = &ground;
     h.weighed = evidence->weigh(h.rows);
     // Where the part's strength is far from linear its evidence is another one than Laplace's.
     h.ln_evidence = h.screened = h.weighed.ln_evidence + part.ln_evidence - part.weighed.ln_evidence;

@@ -22,6 +22,9 @@ struct Hypothesis {
   double probability = 0;                          ///< posterior, over all that were weighed
   bool refitted = false;                           ///< through the whole chain, else along straight lines
   int drawn_at = -1;                               ///< refit from which the lines were drawn; -1: the base fit
+  bool from_usual = false;                         ///< lines are those of its effect at its usual size
+  bool again = false;                              ///< refitted where it had been: says nothing of lines
+  const BaseFit* ground = nullptr;                 ///< whose errors it was weighed under
   bool unsolved = false;                           ///< the chain found no equilibrium: stays as screened
   Weighed weighed;                                 ///< by rows
   std::vector<int> rows;                           ///< of the evidence's directions
@@ -30,6 +33,9 @@ struct Hypothesis {
   /// Place of a direction in `weighed`, or -1.
   int place_of(const std::string& name) const;
 };
+
+/// Whether a set of effects holds another, itself included; both ascending.
+bool is_part_of(const std::vector<int>& part, const std::vector<int>& whole);
 
 /// Every hypothesis weighed along straight lines from the base fit: none, all singles, all pairs, triples on the best
 /// pairs. An effect of one number that has a usual size goes along the secant to it, the others along their slopes.
@@ -44,6 +50,7 @@ class Screening {
   Hypothesis weigh(std::vector<int> effects) const;
 
   Priors priors_;
+  const BaseFit& base_;
   std::vector<std::string> effects_;
   std::vector<int> base_rows_;
   std::vector<std::vector<int>> of_effect_, replaced_;  // rows of the directions
@@ -52,11 +59,12 @@ class Screening {
 };
 
 /// The set of a refit with each further effect, weighed along straight lines from that refit.
+/// @param ground   whose errors count
 /// @param at       the refit
 /// @param part     its hypothesis
 /// @param effects  all that are weighed, in the order that hypotheses count them
 /// @param further  those that @p part does not have, with their slopes at the refit
-std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, const Hypothesis& part,
+std::vector<Hypothesis> screen_beside(const BaseFit& ground, const JointFit& at, const Hypothesis& part,
                                       const std::vector<std::string>& effects, const std::vector<Candidate>& further,
                                       const Priors& priors);
 
@@ -64,6 +72,9 @@ std::vector<Hypothesis> screen_beside(const BaseFit& base, const JointFit& at, c
 /// by the largest that a part of it showed: where lines promise too much of an effect they do so of every set that
 /// holds it. It is a gain over nothing that they promise, so not below nothing's.
 void lower_unfollowed(std::vector<Hypothesis>& hypotheses);
+
+/// ln of prior, evidence and the weight of the errors it is under.
+double ln_weight(const Hypothesis& h);
 
 /// Fills the probabilities and puts the most probable first.
 void normalise(std::vector<Hypothesis>& hypotheses);

@@ -2,6 +2,7 @@
 #include "diagnosis/evidence/left_out.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 
 #include "calibration/held_out.h"
 #include "common/rms.h"
@@ -70,18 +71,39 @@ std::vector<LeftOut> left_out_parts(const calibration::MeasuredScene& scene, con
   return parts;
 }
 
-double left_out_gain(const BaseFit& base, const Hypothesis& first, const Hypothesis& second, const LeftOut& part) {
-  std::vector<bool> out(static_cast<std::size_t>(base.errors.rows()), false);
+double left_out_gain(const Hypothesis& first, const Hypothesis& second, const LeftOut& part) {
+  std::vector<bool> out(static_cast<std::size_t>(first.ground->errors.rows()), false);
   for (const int c : part.clusters) out[static_cast<std::size_t>(c)] = true;
   std::vector<int> rest;
   for (int c = 0; c < static_cast<int>(out.size()); ++c)
     if (!out[static_cast<std::size_t>(c)]) rest.push_back(c);
   if (rest.empty()) return 0;
-  const ErrorCovariance errors(base.errors(rest, rest), base.kernel(rest, rest), base.scale_mm, base.most_mm);
-  const auto given_rest = [&](const Hypothesis& h) {
+  const auto given_rest = [&rest](const Hypothesis& h) {
+    const BaseFit& ground = *h.ground;
+    const ErrorCovariance errors(ground.errors(rest, rest), ground.kernel(rest, rest), ground.scale_mm, ground.most_mm);
     return h.ln_evidence - ln_evidence_of(errors, h, h.evidence->distances(), rest);
   };
   return given_rest(first) - given_rest(second);
+}
+
+double left_out_gain_of(const std::vector<Hypothesis>& hypotheses, int effect, const std::vector<LeftOut>& parts) {
+  const auto with = std::find_if(hypotheses.begin(), hypotheses.end(),
+                                 [effect](const Hypothesis& h) { return is_part_of({effect}, h.effects); });
+  std::vector<int> others = with->effects;
+  std::erase(others, effect);
+  const Hypothesis* without = nullptr;
+  for (const Hypothesis& h : hypotheses) {
+    if (h.ground != with->ground || is_part_of({effect}, h.effects)) continue;
+    if (h.effects == others) {
+      without = &h;
+      break;
+    }
+    if (without == nullptr || h.effects.size() < without->effects.size()) without = &h;
+  }
+  double gain = 0;
+  for (const LeftOut& part : parts)
+    if (without != nullptr) gain += left_out_gain(*with, *without, part);
+  return gain;
 }
 
 }  // namespace supine::diagnosis

@@ -24,6 +24,11 @@ double held_out_rms(const BaseFit& base, const Hypothesis& h, const calibration:
 
 /// ln p(part | rest) of a hypothesis less that of another: > 0 where the first predicts what was left out better, under
 /// all errors, nuisances and the discrepancy.
-double left_out_gain(const BaseFit& base, const Hypothesis& first, const Hypothesis& second, const LeftOut& part);
+double left_out_gain(const Hypothesis& first, const Hypothesis& second, const LeftOut& part);
+
+/// The same of the likeliest hypothesis with an effect, beside the likeliest of its set without it; where that was not
+/// weighed under the same errors, beside the smallest set that was.
+/// @param hypotheses  most probable first; one of them holds the effect
+double left_out_gain_of(const std::vector<Hypothesis>& hypotheses, int effect, const std::vector<LeftOut>& parts);
 
 }  // namespace supine::diagnosis

@@ -55,6 +55,8 @@ Eigen::VectorXd ErrorCovariance::back(const Eigen::VectorXd& turned) const {
   return factor_.matrixL() * (vectors_ * turned);
 }
 
+double ErrorCovariance::ln_det() const { return 2 * factor_.matrixLLT().diagonal().array().log().sum(); }
+
 double ErrorCovariance::square(const Eigen::VectorXd& y, double size_mm) const {
   const Eigen::ArrayXd variance = 1 + size_mm * size_mm * lambda_.array();
   return (turned(y).array().square().col(0) / variance).sum();
@@ -102,7 +104,7 @@ LinearEvidence::LinearEvidence(const ErrorCovariance& errors, const Eigen::Vecto
     const Eigen::VectorXd weight = (1 + s * s * errors.lambda().array()).inverse();
     const Eigen::MatrixXd weighted = weight.asDiagonal() * columns_;
     by_size_.push_back({columns_.transpose() * weighted, weighted.transpose() * y_, y_.cwiseAbs2().dot(weight),
-                        weight.array().log().sum()});
+                        weight.array().log().sum() - errors.ln_det()});
   }
 }
 

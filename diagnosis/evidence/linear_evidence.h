@@ -31,6 +31,7 @@ class ErrorCovariance {
   Eigen::VectorXd back(const Eigen::VectorXd& turned) const;
 
   const Eigen::VectorXd& lambda() const { return lambda_; }
+  double ln_det() const;  ///< of R
   const Eigen::VectorXd& sizes_mm() const { return bins_.sizes_mm; }
   const Eigen::VectorXd& size_prior() const { return bins_.prior; }
   /// yᵀ Σ_s⁻¹ y
@@ -62,7 +63,7 @@ struct Directions {
 
 /// A hypothesis weighed: distances y = −C θ + errors, all normal.
 struct Weighed {
-  double ln_evidence = 0;                   ///< over s, up to what is the same for all hypotheses
+  double ln_evidence = 0;                   ///< over s, up to what is the same for all of as many distances
   Eigen::VectorXd size_probability;         ///< posterior of the bins of s
   std::vector<Eigen::VectorXd> mean;        ///< per bin: posterior of the numbers
   std::vector<Eigen::MatrixXd> covariance;  ///< the same

@@ -25,15 +25,19 @@ Directions with_strengths(Directions all, double factor) {
 }
 
 /// The hypotheses with the evidence they would have.
-std::vector<Hypothesis> weighed_again(std::vector<Hypothesis> hypotheses, const ErrorCovariance& errors,
-                                      double factor) {
+/// @param factor, scale_factor  of the widths of strengths, of the scale of what is unexplained
+std::vector<Hypothesis> weighed_again(std::vector<Hypothesis> hypotheses, double factor, double scale_factor) {
+  std::map<const BaseFit*, ErrorCovariance> errors;
   std::map<const LinearEvidence*, LinearEvidence> others;
   for (Hypothesis& h : hypotheses) {
     if (h.probability < worth_weighing && !h.effects.empty()) continue;
+    const BaseFit& ground = *h.ground;
+    const auto under =
+        errors.try_emplace(&ground, ground.errors, ground.kernel, scale_factor * ground.scale_mm, ground.most_mm).first;
     auto at = others.find(h.evidence.get());
     if (at == others.end())
       at = others
-               .try_emplace(h.evidence.get(), errors, h.evidence->distances(),
+               .try_emplace(h.evidence.get(), under->second, h.evidence->distances(),
                             with_strengths(h.evidence->directions(), factor))
                .first;
     h.ln_evidence += at->second.weigh(h.rows).ln_evidence - h.weighed.ln_evidence;
@@ -55,22 +59,20 @@ std::vector<Inclusion> included_in(const std::vector<Hypothesis>& hypotheses, co
 
 }  // namespace
 
-std::vector<OtherPrior> under_other_priors(const BaseFit& base, const std::vector<Hypothesis>& hypotheses,
+std::vector<OtherPrior> under_other_priors(const std::vector<Hypothesis>& hypotheses,
                                            const std::vector<std::string>& effects,
                                            const std::vector<Inclusion>& included, const Unexplained& unexplained,
                                            const Priors& priors, const std::vector<std::string>& unseen) {
   std::vector<OtherPrior> list;
-  const auto add = [&](const std::string& what, const ErrorCovariance& errors, double factor) {
-    const std::vector<Hypothesis> again = weighed_again(hypotheses, errors, factor);
+  const auto add = [&](const std::string& what, double factor, double scale_factor) {
+    const std::vector<Hypothesis> again = weighed_again(hypotheses, factor, scale_factor);
     list.push_back(
         {what, decide(again, effects, included_in(again, effects, included, priors), unexplained, priors, unseen)});
   };
-  add("strengths half as wide", *base.covariance, 0.5);
-  add("strengths twice as wide", *base.covariance, 2);
-  for (const double factor : {0.5, 2.0}) {
-    const ErrorCovariance errors(base.errors, base.kernel, factor * base.scale_mm, base.most_mm);
-    add(factor < 1 ? "the unexplained half as large" : "the unexplained twice as large", errors, 1);
-  }
+  add("strengths half as wide", 0.5, 1);
+  add("strengths twice as wide", 2, 1);
+  add("the unexplained half as large", 1, 0.5);
+  add("the unexplained twice as large", 1, 2);
   return list;
 }
 

@@ -20,7 +20,7 @@ struct OtherPrior {
 /// The verdict with the prior widths of all strengths, and with the scale of what is unexplained, halved and doubled.
 /// Hypotheses are weighed again where they were linearised; those under a thousandth of the probability keep the
 /// evidence they have. What was left out and what is unexplained count as they are.
-std::vector<OtherPrior> under_other_priors(const BaseFit& base, const std::vector<Hypothesis>& hypotheses,
+std::vector<OtherPrior> under_other_priors(const std::vector<Hypothesis>& hypotheses,
                                            const std::vector<std::string>& effects,
                                            const std::vector<Inclusion>& included, const Unexplained& unexplained,
                                            const Priors& priors, const std::vector<std::string>& unseen);

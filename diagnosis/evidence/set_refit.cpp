@@ -26,15 +26,6 @@ constexpr double far = 1;        // of a nuisance, in sigma: its shape holds no 
 constexpr double misplaced = 2;  // the same: a fit that has it there is no place to begin
 constexpr int most_joint_steps = 8;
 
-/// Nuisances that no effect of the set replaces.
-std::vector<Nuisance> kept(const JointFit& from, const std::vector<std::string>& effects) {
-  std::vector<Nuisance> list = from.nuisances;
-  std::erase_if(list, [&effects](const Nuisance& nuisance) {
-    return nuisance.pose.empty() && std::find(effects.begin(), effects.end(), nuisance.effect) != effects.end();
-  });
-  return list;
-}
-
 double offset_of(const Hypothesis& h, const std::string& name) {
   const int place = h.place_of(name);
   return place < 0 ? 0 : h.weighed.number(place).first;
@@ -104,17 +95,6 @@ VectorXd distances_at_posterior(const BaseFit& base, const Hypothesis& h, const 
   return distance;
 }
 
-/// Fills the hypothesis of a fit: Laplace's evidence at the optimum.
-void weigh_at(const BaseFit& base, const JointFit& fit, Hypothesis& h) {
-  h.refitted = true;
-  h.evidence = std::make_shared<LinearEvidence>(*base.covariance, base.distances(fit.fit.residuals),
-                                                directions_at(fit.fit, *fit.parameters, fit.nuisances, base.clusters));
-  h.rows.resize(static_cast<std::size_t>(h.evidence->directions().size()));
-  std::iota(h.rows.begin(), h.rows.end(), 0);
-  h.weighed = h.evidence->weigh(h.rows);
-  h.ln_evidence = h.weighed.ln_evidence;
-}
-
 /// Densities of the strengths whose effects are far from linear, and the evidence corrected by each.
 Curved curved_strengths(const RefitGround& ground, const std::vector<Candidate>& candidates,
                         const FreeParameters& parameters, Refit& result) {
@@ -150,23 +130,6 @@ RangeEnd range_end(const FreeParameters& parameters, const VectorXd& u, Index i)
   return u[i] - low < near && !absent_there ? RangeEnd::lower : RangeEnd::none;
 }
 
-simulation::EffectSetting free_setting(const std::string& name) {
-  constexpr double least_share = 1e-3;  // of the usual size: where the logarithm of a strength ends
-  const simulation::Effect& effect = *simulation::find_effect(name);
-  simulation::EffectSetting setting = simulation::null_setting(effect);
-  for (const simulation::Parameter& row : effect.parameters()) {
-    const StrengthPrior prior = strength_prior(row);
-    simulation::Setting& number = setting.parameters[row.name];
-    number = {row.median, true, prior.spread, row.lower, row.upper};
-    if (row.shape) number.prior_sd = simulation::prior_sd(row);
-    if (!row.shape && prior.log_normal) {
-      number.lower = std::max(row.lower, least_share * row.median);
-      number.prior_sd = row.median * std::expm1(prior.spread);
-    }
-  }
-  return setting;
-}
-
 namespace {
 
 /// Numbers with nuisances as errors, then, where that leads far, with them.
@@ -191,24 +154,15 @@ void fit_set(const calibration::MeasuredScene& scene, const BaseFit& base, const
   weigh_at(base, joint, h);
 }
 
-/// The same with nothing moved and effects at their usual size; a hypothesis that is not refitted where that has no
-/// equilibrium.
-Hypothesis fit_afresh(const calibration::MeasuredScene& scene, const BaseFit& base, const Hypothesis& screened,
-                      JointFit& joint) {
-  Hypothesis h = screened;
-  h.refitted = false;
+/// The same with nothing moved and effects at their usual size. @return  whether that has an equilibrium
+bool fit_afresh(const calibration::MeasuredScene& scene, const BaseFit& base, Hypothesis& h, JointFit& joint) {
   for (Nuisance& nuisance : joint.nuisances) nuisance.value = 0;
   try {
-    calibration::Evaluator evaluator(scene, joint.parameters->base(), accurate_enough());
-    JointFitter fitter(evaluator, joint, base);
-    fitter.predict({joint.parameters->start(), joint.nuisances}, nullptr);
-    fitter.linearise();
-    fitter.descend(2 * most_joint_steps);
-    weigh_at(base, joint, h);
+    fit_jointly(scene, base, {joint.parameters->start(), joint.nuisances}, nullptr, 2 * most_joint_steps, joint, h);
+    return true;
   } catch (const NumericalFailure&) {
-    // No equilibrium at the usual size.
+    return false;
   }
-  return h;
 }
 
 bool is_misplaced(const JointFit& fit) {
@@ -222,6 +176,8 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
               const std::vector<Candidate>& candidates, const Hypothesis& screened, Refit& result) {
   const JointFit unfitted = result.joint;
   Hypothesis& h = result.hypothesis = screened;
+  if (screened.from_usual && fit_afresh(scene, base, h, result.joint)) return result.solved = true;
+  if (screened.from_usual) result.joint = unfitted, h = screened;
   try {
     fit_set(scene, base, start_of(*unfitted.parameters, from, candidates, screened), &from.fit.prediction.solution,
             result.joint, h);
@@ -232,9 +188,8 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
   const bool bent = result.solved && std::abs(screened.screened - h.ln_evidence) > lines_bend_at;
   if (screened.drawn_at < 0 && !bent && !is_misplaced(from)) return result.solved;
   JointFit other = unfitted;
-  other.fit.mask = base.fit.mask;
-  Hypothesis afresh = fit_afresh(scene, base, screened, other);
-  if (afresh.refitted && (!result.solved || afresh.ln_evidence > h.ln_evidence)) {
+  Hypothesis afresh = screened;
+  if (fit_afresh(scene, base, afresh, other) && (!result.solved || afresh.ln_evidence > h.ln_evidence)) {
     result.joint = std::move(other);
     h = std::move(afresh);
     result.solved = true;
@@ -242,30 +197,51 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
   return result.solved;
 }
 
-}  // namespace
-
-Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
-            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened) {
-  Refit result;
-  simulation::Model model = given;
-  for (const int effect : screened.effects) {
-    result.effects.push_back(candidates[static_cast<std::size_t>(effect)].effect);
-    model.effects.push_back(free_setting(result.effects.back()));
-  }
-  result.joint.parameters.emplace(model);
-  result.joint.nuisances = kept(from, result.effects);
-  result.joint.size_mm = base.size_of(screened.weighed);
-  if (!find_fit(scene, base, from, candidates, screened, result)) return result;
-  JointFit& joint = result.joint;
-  const FreeParameters there(with_nuisances(model, joint.nuisances, poses_of(scene)));
+/// Fills what a fit says of its set.
+void tell_of(const calibration::MeasuredScene& scene, const BaseFit& base, const std::vector<Candidate>& candidates,
+             double least, Refit& result) {
+  const JointFit& joint = result.joint;
+  const FreeParameters there(with_nuisances(joint.parameters->base(), joint.nuisances, poses_of(scene)));
   const FitErrors errors(base, joint.nuisances, joint.size_mm);
-  const Curved curved = curved_strengths({scene, base, errors.metric(), joint.nuisances}, candidates, there, result);
+  Curved curved;
+  if (result.hypothesis.ln_prior + result.hypothesis.ln_evidence >= least)
+    curved = curved_strengths({scene, base, errors.metric(), joint.nuisances}, candidates, there, result);
   result.model = joint.parameters->model(joint.fit.u);
   result.parameters = parameters_of(result, there, curved);
   result.at_border = is_at_border(result.parameters);
   result.rms_mm =
       rms(distances_at_posterior(base, result.hypothesis, joint.fit.residuals).head(joint.fit.residuals.skin_rows()));
   result.held_out_rms_mm = held_out_rms(base, result.hypothesis, joint.fit.residuals);
+}
+
+}  // namespace
+
+Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
+            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened, double least) {
+  Refit result;
+  for (const int effect : screened.effects)
+    result.effects.push_back(candidates[static_cast<std::size_t>(effect)].effect);
+  result.joint = unfitted(given, base, from, result.effects);
+  result.joint.size_mm = base.size_of(screened.weighed);
+  if (find_fit(scene, base, from, candidates, screened, result)) tell_of(scene, base, candidates, least, result);
+  return result;
+}
+
+Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground, const Refit& before,
+                  const std::vector<Candidate>& candidates, double least) {
+  Refit result;
+  result.effects = before.effects;
+  result.joint = before.joint;
+  result.hypothesis = before.hypothesis;
+  try {
+    fit_set(scene, ground, before.joint.fit.u, &before.joint.fit.prediction.solution, result.joint, result.hypothesis);
+    result.solved = true;
+  } catch (const NumericalFailure&) {
+    return result;  // under these errors it leads where there is no equilibrium
+  }
+  result.hypothesis.again = true;
+  result.hypothesis.screened = result.hypothesis.ln_evidence;
+  tell_of(scene, ground, candidates, least, result);
   return result;
 }
 

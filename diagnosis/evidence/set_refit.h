@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
-#include "diagnosis/evidence/hypotheses.h"
+#include "diagnosis/evidence/set_fit.h"
 
 namespace supine::diagnosis {
 
@@ -34,10 +35,6 @@ struct Refit {
   JointFit joint;                           ///< where it ended
 };
 
-/// The effect with its strengths free from @ref strength_prior and its place and shape free from the catalogue's
-/// priors.
-simulation::EffectSetting free_setting(const std::string& effect);
-
 /// Follows a screened hypothesis through the chain: Levenberg-Marquardt in moduli, strengths (in their logarithm where
 /// that is their prior), places and widths from where the screening has them, nuisances and discrepancy as errors, at
 /// the size of the discrepancy that the screening has likeliest. Where a nuisance ends further than a standard
@@ -47,9 +44,16 @@ simulation::EffectSetting free_setting(const std::string& effect);
 /// A second fit begins with effects at their usual size and nothing moved, and the likelier of both is kept, where the
 /// first ends far from what lines promise, where @p screened was drawn from a refit, and where @p from had to move what
 /// is never known by more than two standard deviations: a strength that begins near zero may stay there.
+/// One whose lines are those of its usual size begins there at once.
 /// @param given     the base model: where its priors stand
 /// @param from      the fit at which @p screened was drawn: the base fit, or a refit of a part of the set
+/// @param least     ln of prior and evidence of a set so unlikely that nobody will ask for the density of its strength
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
-            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened);
+            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened,
+            double least = -std::numeric_limits<double>::infinity());
+
+/// Follows a set once more from where it was followed before, under the errors of @p ground.
+Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground, const Refit& before,
+                  const std::vector<Candidate>& candidates, double least);
 
 }  // namespace supine::diagnosis

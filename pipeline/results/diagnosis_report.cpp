@@ -300,6 +300,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   for (const diagnosis::Inclusion& one : found.included)  // most probable first
     for (const Score& score : found.table.scores)
       if (score.effect == one.effect) f["candidates"].push_back(candidate_json(found, score));
+  f["errors_beside"] = found.errors_beside();
   f["creased_points"] = found.base.creased_points;
   f["base_mae_mm"] = found.base.fit.residuals.skin_mm().cwiseAbs().mean();
   f["base_rms_mm"] = found.rms_mm;

@@ -55,6 +55,13 @@ void say_creases(const Run& run, const Findings& found) {
       creased, 100 * static_cast<double>(creased) / static_cast<double>(found.base.fit.residuals.skin_rows())));
 }
 
+/// Effects beside which the errors were measured anew.
+void say_beside(const Run& run, const Findings& found) {
+  const auto beside = found.errors_beside();
+  if (!beside.empty())
+    run.say("  errors of mesh and body measured again beside " + joined(beside, " and ") + ", for all that holds it");
+}
+
 /// What was expected of the body and turned out otherwise. Where something is missing it may have stood in for that.
 void say_unexpected(const Run& run, const Findings& found) {
   if (found.diagnosis.verdict == Verdict::missing || found.diagnosis.verdict == Verdict::ambiguous) return;
@@ -198,6 +205,7 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result) {
   const auto& b = found.budget;
   say_places(run, found);
   say_creases(run, found);
+  say_beside(run, found);
   say_unexpected(run, found);
   say_hypotheses(run, found);
   run.say(

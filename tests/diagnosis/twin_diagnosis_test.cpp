@@ -263,7 +263,16 @@ TEST(TwinDiagnosis, ALadderAddsTwoEffectsOneAfterTheOtherAndShowsWhatElseCouldHa
   options.other_meshes = false;
   options.refits = 5;
   options.priors = twin_priors();
-  const Ladder ladder = climb(subject, options, *examine(subject, options));
+  const auto both = examine(subject, options);
+  ASSERT_EQ(both->beside.size(), 1u) << both->diagnosis.why;
+  const Findings::Beside& beside = both->beside.front();
+  EXPECT_EQ(beside.effects.size(), 1u);
+  EXPECT_GT((beside.ground->errors - both->base.errors).norm(), 0);
+  EXPECT_EQ(both->hypotheses.front().effects.size(), 2u);
+  for (const Hypothesis& h : both->hypotheses)
+    EXPECT_EQ(h.ground, is_part_of(beside.effects, h.effects) ? beside.ground.get() : &both->base);
+  EXPECT_TRUE(names(both->diagnosis, "gravity_tilt") && names(both->diagnosis, "chest_wall_motion"));
+  const Ladder ladder = climb(subject, options, *both);
   ASSERT_EQ(ladder.rungs.size(), 3u) << ladder.stopped;
   std::set<std::string> added;
   for (std::size_t r = 1; r < ladder.rungs.size(); ++r) {

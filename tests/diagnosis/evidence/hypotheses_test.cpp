@@ -38,6 +38,14 @@ TEST(Hypotheses, ARiseOfWhatWasFollowedRaisesNothing) {
   EXPECT_EQ(list[1].ln_evidence, 4);
 }
 
+TEST(Hypotheses, WhatWasFollowedAgainSaysNothingOfLines) {
+  std::vector<Hypothesis> list = {screened({}, 0), screened({0}, 5), screened({1}, 4)};
+  list[1].refitted = list[1].again = true;
+  list[1].ln_evidence = 2;
+  lower_unfollowed(list);
+  EXPECT_EQ(list[2].ln_evidence, 4);
+}
+
 TEST(Hypotheses, NothingFallsWhereNothingWasFollowed) {
   std::vector<Hypothesis> list = {screened({}, 0), screened({0}, 5)};
   lower_unfollowed(list);

@@ -79,6 +79,20 @@ TEST(LinearEvidence, IsTheDensityOfTheMeasurementOverAllSizesOfTheDiscrepancy) {
     EXPECT_NEAR(evidence.weigh(which).ln_evidence - nothing, log_evidence(made, which, y) - direct, 1e-8);
 }
 
+TEST(LinearEvidence, UnderOtherErrorsCountsWhatTheyCouldHaveMade) {
+  const Made made;
+  Made other;
+  other.errors = 3 * made.errors + 0.1 * gaussian_kernel(made.place, made.place, 8);
+  other.covariance = ErrorCovariance(other.errors, other.kernel, scale_mm, most_mm);
+  std::mt19937_64 generator(8);
+  for (const double size_mm : {0.2, 1.5}) {
+    const VectorXd y = size_mm * normals(generator, count);
+    const double gain = LinearEvidence(other.covariance, y, other.all).weigh({0, 1}).ln_evidence -
+                        LinearEvidence(made.covariance, y, made.all).weigh({0}).ln_evidence;
+    EXPECT_NEAR(gain, log_evidence(other, {0, 1}, y) - log_evidence(made, {0}, y), 1e-8);
+  }
+}
+
 TEST(LinearEvidence, PosteriorsAreThoseOfRegression) {
   const Made made;
   std::mt19937_64 generator(2);

@@ -28,6 +28,7 @@ struct Sheet {
       Hypothesis h;
       if (with) h.effects = {0}, h.rows = {0};
       h.evidence = evidence;
+      h.ground = &base;
       h.weighed = evidence->weigh(h.rows);
       h.ln_evidence = h.weighed.ln_evidence;
       h.ln_prior = std::log(0.5);
@@ -37,9 +38,7 @@ struct Sheet {
     included = inclusions(hypotheses, effects, priors);
   }
 
-  std::vector<OtherPrior> others() const {
-    return under_other_priors(base, hypotheses, effects, included, {}, priors, {});
-  }
+  std::vector<OtherPrior> others() const { return under_other_priors(hypotheses, effects, included, {}, priors, {}); }
 };
 
 /// The least misfit that names the effect.
