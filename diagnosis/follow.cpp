@@ -78,11 +78,13 @@ class Follower {
     return found_.base;
   }
 
-  /// Where something is missing, lines from nothing do not show what a ligament would do.
+  /// Where something is missing, lines from nothing do not show what a ligament would do. Of effects that this scan
+  /// could not settle there is nothing to be seen.
   void look_from_usual_sizes() {
     if (!something_stands_out(found_)) return;
     if (options_.progress) options_.progress("lines from usual sizes");
-    weigh_from_usual_size(subject_.scene, subject_.given, found_.base, found_.candidates, found_.hypotheses);
+    weigh_from_usual_size(subject_.scene, subject_.given, found_.base, found_.candidates, unsettled(found_.table),
+                          found_.hypotheses);
   }
 
   /// Of prior and evidence under some errors: a set with less is too unlikely to be asked for more.

@@ -95,11 +95,13 @@ void fit_jointly(const calibration::MeasuredScene& scene, const BaseFit& base, c
 }
 
 void weigh_from_usual_size(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
-                           const std::vector<Candidate>& candidates, std::vector<Hypothesis>& hypotheses) {
+                           const std::vector<Candidate>& candidates, const std::vector<std::string>& skipped,
+                           std::vector<Hypothesis>& hypotheses) {
   const auto look = [&](Hypothesis& h) {
     if (h.effects.size() != 1 || h.refitted) return;
     const Candidate& candidate = candidates[static_cast<std::size_t>(h.effects.front())];
     if (!is_far_from_linear(candidate) || !candidate.secant_at) return;
+    if (std::find(skipped.begin(), skipped.end(), candidate.effect) != skipped.end()) return;
     JointFit joint = unfitted(given, base, base, {candidate.effect});
     joint.size_mm = base.size_of(h.weighed);
     Hypothesis there = h;

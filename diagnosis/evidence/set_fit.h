@@ -28,7 +28,9 @@ void fit_jointly(const calibration::MeasuredScene& scene, const BaseFit& base, c
 /// them at their usual size, after a few steps towards the measured distances: a ligament changes what the moduli do,
 /// and lines from a breast without it say nothing of that. Kept where that says more than lines from nothing;
 /// Hypothesis::from_usual then.
+/// @param skipped  effects that are not looked at
 void weigh_from_usual_size(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
-                           const std::vector<Candidate>& candidates, std::vector<Hypothesis>& hypotheses);
+                           const std::vector<Candidate>& candidates, const std::vector<std::string>& skipped,
+                           std::vector<Hypothesis>& hypotheses);
 
 }  // namespace supine::diagnosis

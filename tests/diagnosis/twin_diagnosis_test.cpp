@@ -191,6 +191,28 @@ TEST(TwinDiagnosis, ALigamentIsNamedByTwoScansTogetherAndEachPredictedFromTheOth
   EXPECT_GT(found->included.front().left_out_gain, 0);
 }
 
+TEST(TwinDiagnosis, LinesFromItsUsualSizeShowMoreOfALigamentThanLinesFromNothing) {
+  const Twin twin({with("ligament", "stiffness_kpa_per_mm", 2.0), noise_mm});
+  const Subject subject = subject_of(twin);
+  const auto found = findings_of(subject, 0);
+  const auto effects = found->effects();
+  const int ligament = static_cast<int>(std::find(effects.begin(), effects.end(), "ligament") - effects.begin());
+  const auto single = [ligament](const std::vector<Hypothesis>& list) {
+    return *std::find_if(list.begin(), list.end(),
+                         [ligament](const Hypothesis& h) { return h.effects == std::vector{ligament}; });
+  };
+  std::vector<Hypothesis> list = found->hypotheses;
+  weigh_from_usual_size(subject.scene, subject.given, found->base, found->candidates, {}, list);
+  const Hypothesis before = single(found->hypotheses), after = single(list);
+  EXPECT_TRUE(after.from_usual);
+  EXPECT_FALSE(after.refitted);
+  EXPECT_GT(after.probability, before.probability);
+  const Refit followed = refit(subject.scene, subject.given, found->base, found->base, found->candidates, after);
+  ASSERT_TRUE(followed.solved);
+  EXPECT_LT(std::abs(after.ln_evidence - followed.hypothesis.ln_evidence),
+            0.5 * std::abs(before.ln_evidence - followed.hypothesis.ln_evidence));
+}
+
 TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
   simulation::Model truth = with("chest_wall_motion", "amplitude_mm", 6);
   truth.effects[0].parameters.at("centre_lateral").value = 0.35;
