@@ -9,6 +9,7 @@
 #include "common/error.h"
 #include "common/first_failure.h"
 #include "common/rms.h"
+#include "diagnosis/creases.h"
 #include "diagnosis/other_mesh.h"
 #include "diagnosis/weighted_fit.h"
 #include "meshing/topology.h"
@@ -245,11 +246,12 @@ void measure_on_two(const calibration::MeasuredScene& scene, const simulation::M
   failure.rethrow();
 }
 
-/// Root of a field of squares as seen around each point, over its root mean square: edges and folds err by more than
-/// the mound. Nowhere under a half of it.
-Eigen::VectorXd share_around(const Residuals& residuals, const Eigen::VectorXd& square) {
+/// Root of a field of squares as seen around each point, over its root mean square where @p counts: edges err by more
+/// than the mound. Nowhere under a half of it.
+Eigen::VectorXd share_around(const Residuals& residuals, const Eigen::VectorXd& square, const Eigen::VectorXd& counts) {
   constexpr double around_mm = 15, least = 0.25;
-  if (!(square.mean() > 0)) return Eigen::VectorXd::Ones(residuals.size());
+  const double mean_square = square.dot(counts) / counts.sum();
+  if (!(mean_square > 0)) return Eigen::VectorXd::Ones(residuals.size());
   const calibration::Clusters clusters = calibration::cluster_points(residuals, 450);
   const Eigen::VectorXd mean = clusters.means(square);
   Eigen::VectorXd around(mean.size());
@@ -260,27 +262,31 @@ Eigen::VectorXd share_around(const Residuals& residuals, const Eigen::VectorXd& 
         sum += clusters.members[j] * mean[j];
         points += clusters.members[j];
       }
-    around[i] = std::max(sum / points, least * square.mean());
+    around[i] = std::max(sum / points, least * mean_square);
   }
   Eigen::VectorXd share(residuals.size());
   for (Eigen::Index r = 0; r < share.size(); ++r) share[r] = std::sqrt(around[clusters.of_point[r]]);
-  return share / std::sqrt(mean_square(share));
+  return share / std::sqrt(share.cwiseAbs2().dot(counts) / counts.sum());
 }
 
-/// Fills what follows from the two changes.
-void summarise(const calibration::Fit& fit, NumericalError& result) {
+/// Fills what follows from the two changes. Creases stand in the errors by themselves (creases.h): what they do
+/// otherwise on another mesh says nothing of the rest of the skin.
+void summarise(const calibration::MeasuredScene& scene, const calibration::Fit& fit, NumericalError& result) {
   constexpr double unknown_length_mm = 25;
   const Residuals& residuals = fit.residuals;
   const bool finer = result.finer_failure.empty(), coarser = result.coarser_failure.empty();
   if (!finer) result.finer_mm = Eigen::VectorXd::Zero(residuals.size());
   if (!coarser) result.coarser_mm = Eigen::VectorXd::Zero(residuals.size());
-  const Eigen::VectorXd square =
-      std::pow(result.finer_doubt, 2) * result.finer_mm.cwiseAbs2() + result.coarser_mm.cwiseAbs2();
-  result.spread_mm = std::sqrt(square.mean());
-  result.share = share_around(residuals, square);
+  Eigen::VectorXd smooth = (crease_error(scene, fit.prediction, residuals).sd_mm.array() == 0).cast<double>();
+  if (!(smooth.sum() > 0)) smooth.setOnes();
+  const Eigen::VectorXd finer_there = result.finer_mm.cwiseProduct(smooth);
+  const Eigen::VectorXd coarser_there = result.coarser_mm.cwiseProduct(smooth);
+  const Eigen::VectorXd square = std::pow(result.finer_doubt, 2) * finer_there.cwiseAbs2() + coarser_there.cwiseAbs2();
+  result.spread_mm = std::sqrt(square.sum() / smooth.sum());
+  result.share = share_around(residuals, square, smooth);
   if (finer && coarser) {
     result.length_mm =
-        0.5 * (correlation_length_mm(residuals, result.finer_mm) + correlation_length_mm(residuals, result.coarser_mm));
+        0.5 * (correlation_length_mm(residuals, finer_there) + correlation_length_mm(residuals, coarser_there));
     return;
   }
   result.length_mm = unknown_length_mm;
@@ -323,7 +329,7 @@ NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, 
   else
     measure_on_two(scene, model, fit, near, result);
   if (result.coarser_mm.size() == 0 && result.coarser_failure.empty()) result.coarser_failure = result.finer_failure;
-  summarise(fit, result);
+  summarise(scene, fit, result);
   return result;
 }
 

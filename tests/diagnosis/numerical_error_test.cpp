@@ -8,6 +8,7 @@
 #include "calibration/free_parameters.h"
 #include "common/error.h"
 #include "common/rms.h"
+#include "diagnosis/creases.h"
 #include "diagnosis/other_mesh.h"
 #include "tests/calibration/twin.h"
 
@@ -41,6 +42,25 @@ TEST(NumericalError, IsWhatTwoOtherMeshesChange) {
   EXPECT_NEAR(error.share.squaredNorm(), points, 1e-6);
   EXPECT_GE(error.share.minCoeff(), 0.4) << "no place is without error";
   EXPECT_GT(error.share.maxCoeff(), 1.2) << "places differ";
+}
+
+/// The skin beyond a plane was twice as long: it is pressed together there as if it had folded.
+TEST(NumericalError, OfCreasesSaysNothingOfTheRestOfTheSkin) {
+  Fitted f;
+  const Points& x = f.fit.prediction.solution.poses[0].x;
+  const double plane = x.col(0).mean();
+  Points& X = f.fit.prediction.solution.X = x;
+  for (Eigen::Index i = 0; i < X.rows(); ++i)
+    if (X(i, 0) > plane) X(i, 0) += X(i, 0) - plane;
+  const auto smooth =
+      (crease_error(f.twin.scene(), f.fit.prediction, f.fit.residuals).sd_mm.array() == 0).cast<double>().eval();
+  ASSERT_LT(smooth.mean(), 0.8);
+  const NumericalError error = measure_numerical_error(f.twin.scene(), twin_truth(), f.fit);
+  const Eigen::ArrayXd square =
+      std::pow(error.finer_doubt, 2) * error.finer_mm.array().square() + error.coarser_mm.array().square();
+  EXPECT_NEAR(error.spread_mm, std::sqrt((square * smooth).sum() / smooth.sum()), 1e-9);
+  EXPECT_NEAR((error.share.array().square() * smooth).sum(), smooth.sum(), 1e-6);
+  EXPECT_GT(std::abs(error.spread_mm - std::sqrt(square.mean())), 0.01 * error.spread_mm);
 }
 
 /// Scan by quadratic elements, model of the linear ones of the same shapes.
