@@ -4,8 +4,8 @@
 
 CASES holds case folders and answers/NAME.json. Where the answer has `targets` (supine-phantom), those places are asked for; landmarks that were
 measured in the pose are held against where all else expects them, in every case. Meshes and answers of the tool go to WORK and are kept: what is
-there is not made again. --diagnose asks for regions over the sets of effects that supine-diagnose finds (from the case's own model), in place of
-straight lines at the fit. --score makes nothing and counts what is there.
+there is not made again. --diagnose climbs the ladder first, from the case's own model, and asks with the model at its end for regions over the
+sets that supine-diagnose finds, in place of straight lines at a fit of a model that lacks them. --score makes nothing and counts what is there.
 """
 import argparse
 import csv
@@ -41,8 +41,9 @@ def make(binaries, case, answer, out, diagnose):
             table.writerows([t["name"], *t["prone_mm"]] for t in answer["targets"])
         asked = ["--points", out / "asked.csv"]
     if diagnose:
-        run(binaries, "diagnose", case, out / "mesh.vtu", "--model", case / "model.toml", "-o", out)
-        asked += ["--diagnosis", out / "diagnosis.json"]
+        ladder = out / "ladder"
+        run(binaries, "diagnose", case, out / "mesh.vtu", "--model", case / "model.toml", "--ladder", "-o", ladder)
+        asked += ["--model", ladder / "model.toml", "--diagnosis", ladder / "diagnosis.json"]
     run(binaries, "targets", case, out / "mesh.vtu", *asked, "--pose", POSE, "--no-further-scans", "-o", out / "targets")
 
 
