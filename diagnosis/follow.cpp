@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "common/error.h"
+#include "diagnosis/beside.h"
 #include "diagnosis/evidence/left_out.h"
 #include "diagnosis/next_set.h"
 
@@ -20,7 +21,6 @@ constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
 constexpr double cost_of_an_idle_effect = 1;  // ln evidence, by and large
 constexpr std::size_t singles_to_draw_from = 3, most_further = 8, most_where_lines_bend = 6;  // the last: times refits
 constexpr std::size_t most_on_from_first = 5;
-constexpr double likelier_than_not = 0.5;
 
 /// Effects that appear in what is screened with at least some probability.
 bool something_stands_out(const Findings& found) {
@@ -32,13 +32,6 @@ bool something_stands_out(const Findings& found) {
 Hypothesis& hypothesis_of(Findings& found, const std::vector<int>& effects) {
   return *std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
                        [&effects](const Hypothesis& h) { return h.effects == effects; });
-}
-
-double log_sum(const std::vector<double>& logs) {
-  const double most = *std::max_element(logs.begin(), logs.end());
-  double sum = 0;
-  for (const double one : logs) sum += std::exp(one - most);
-  return most + std::log(sum);
 }
 
 class Follower {
@@ -60,7 +53,7 @@ class Follower {
     }
     if (!bent_ && most > 0) on_from_first();
     if (bent_) one_at_a_time();
-    for (std::vector<int> part = surest_part(); most > 0 && !part.empty(); part = surest_part())
+    for (std::vector<int> part = surest_part(found_); most > 0 && !part.empty(); part = surest_part(found_))
       if (!look_again_beside(part)) break;
   }
 
@@ -101,24 +94,8 @@ class Follower {
   void weigh() {
     lower_unfollowed(found_.hypotheses);
     if (bent_) hold_to_parts();
-    keep_odds();
+    keep_odds(found_);
     normalise(found_.hypotheses);
-  }
-
-  /// ln of the odds that a set holds a part, under the errors they are weighed under.
-  double ln_odds_of(const std::vector<int>& part) const {
-    std::vector<double> with, without;
-    for (const Hypothesis& h : found_.hypotheses)
-      (is_part_of(part, h.effects) ? with : without).push_back(ln_weight(h));
-    return log_sum(with) - log_sum(without);
-  }
-
-  /// Errors beside a part judge what is beside it, not the part itself: a mesh that errs more beside it would speak
-  /// against it, or for it, by its size alone.
-  void keep_odds() {
-    if (found_.beside.empty()) return;
-    const Findings::Beside& last = found_.beside.back();
-    last.ground->ln_weight += last.ln_odds - ln_odds_of(last.effects);
   }
 
   void follow_one(const std::vector<int> effects) {
@@ -290,31 +267,6 @@ class Follower {
     }
   }
 
-  /// ln of what speaks for sets without an effect, up to what is the same for all.
-  double doubt(int effect) const {
-    double most = -std::numeric_limits<double>::infinity();
-    for (const Hypothesis& h : found_.hypotheses)
-      if (!is_part_of({effect}, h.effects)) most = std::max(most, ln_weight(h));
-    return most;
-  }
-
-  /// What would be named by itself, the surest effect of it, where more than it is likelier than not: then errors that
-  /// were measured without it judge what is beside it. Together with what they were measured beside before. Empty where
-  /// there is no such effect, or where nothing more is likely than what they were measured beside.
-  std::vector<int> surest_part() const {
-    std::vector<int> part;
-    if (!found_.beside.empty()) part = found_.beside.back().effects;
-    int next = -1;
-    for (const int e : found_.hypotheses.front().effects)
-      if (std::find(part.begin(), part.end(), e) == part.end() && (next < 0 || doubt(e) < doubt(next))) next = e;
-    if (next < 0 || inclusion(found_.hypotheses, next) < found_.priors.named_at) return {};
-    part.insert(std::upper_bound(part.begin(), part.end(), next), next);
-    double more = 0;
-    for (const Hypothesis& h : found_.hypotheses)
-      if (is_part_of(part, h.effects) && h.effects.size() > part.size()) more += h.probability;
-    return more > likelier_than_not ? part : std::vector<int>{};
-  }
-
   /// The refit of a set, followed now where it was not; the number of refits where there is none.
   std::size_t refit_with(const std::vector<int>& effects) {
     const auto is_it = [&effects](const Refit& r) { return r.solved && r.hypothesis.effects == effects; };
@@ -356,7 +308,7 @@ class Follower {
     const std::size_t at = refit_with(part);
     if (at >= found_.refits.size()) return false;
     tell("errors of mesh and body beside", part);
-    Findings::Beside beside{part, nullptr, part.front(), ln_odds_of(part), 0};
+    Findings::Beside beside{part, nullptr, part.front(), ln_odds_of(found_.hypotheses, part), 0};
     if (!found_.beside.empty())
       for (const int e : part)
         if (!is_part_of({e}, found_.beside.back().effects)) beside.surest = e;

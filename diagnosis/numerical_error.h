@@ -16,9 +16,10 @@ struct NumericalError {
   Eigen::VectorXd finer_mm;    ///< #R, distance with finer elements, less that on the given mesh
   double finer_doubt = 1;      ///< how uncertain finer_mm is, as a share of it
   Eigen::VectorXd coarser_mm;  ///< #R, what another surface of the body changes
-  double spread_mm = 0;        ///< rms of finer_doubt × finer_mm and coarser_mm: what is left when finer_mm was added
-  Eigen::VectorXd share;       ///< #R, of the spread at each point: what the places around it show; mean square 1
-  double length_mm = 0;        ///< over which it is alike
+  /// Away from creases (creases.h), rms of finer_doubt × finer_mm and coarser_mm: what is left when finer_mm was added.
+  double spread_mm = 0;
+  Eigen::VectorXd share;  ///< #R, of the spread at each point: what the places around it show; mean square 1 there
+  double length_mm = 0;   ///< over which it is alike
   /// Why a mesh gave no answer, or empty. Its column is zero then, and the spread not less than largest_share_of_way
   /// of the way to the first pose.
   std::string finer_failure, coarser_failure;
