@@ -5,17 +5,12 @@
 #include <cmath>
 #include <limits>
 
+#include "common/log_sum.h"
+
 namespace supine::diagnosis {
 namespace {
 
 constexpr double likelier_than_not = 0.5;
-
-double log_sum(const std::vector<double>& logs) {
-  const double most = *std::max_element(logs.begin(), logs.end());
-  double sum = 0;
-  for (const double one : logs) sum += std::exp(one - most);
-  return most + std::log(sum);
-}
 
 /// ln of what speaks for sets without an effect, up to what is the same for all.
 double doubt(const std::vector<Hypothesis>& hypotheses, int effect) {
@@ -45,7 +40,10 @@ std::vector<int> surest_part(const Findings& found) {
 double ln_odds_of(const std::vector<Hypothesis>& hypotheses, const std::vector<int>& part) {
   std::vector<double> with, without;
   for (const Hypothesis& h : hypotheses) (is_part_of(part, h.effects) ? with : without).push_back(ln_weight(h));
-  return log_sum(with) - log_sum(without);
+  const auto sum = [](const std::vector<double>& logs) {
+    return log_sum(Eigen::Map<const Eigen::VectorXd>(logs.data(), static_cast<Eigen::Index>(logs.size())));
+  };
+  return sum(with) - sum(without);
 }
 
 void keep_odds(Findings& found) {

@@ -13,6 +13,7 @@ namespace supine::diagnosis {
 std::vector<int> surest_part(const Findings& found);
 
 /// ln of the odds that a set holds a part, every set under the errors it is weighed under.
+/// @pre  some sets hold it and some do not
 double ln_odds_of(const std::vector<Hypothesis>& hypotheses, const std::vector<int>& part);
 
 /// Gives what is weighed under the last errors the weight with which these odds are what they were before: errors

@@ -146,6 +146,7 @@ class Follower {
       return std::find(names.begin(), names.end(), c.effect) == names.end();
     });
     for (Hypothesis& drawn : screen_beside(ground_of(part.effects), refit.joint, part, names, further, found_.priors)) {
+      if (drawn.ground != &ground_of(drawn.effects)) continue;  // weighed under errors measured beside more
       drawn.drawn_at = static_cast<int>(at);
       const auto same = std::find_if(found_.hypotheses.begin(), found_.hypotheses.end(),
                                      [&drawn](const Hypothesis& h) { return h.effects == drawn.effects; });
@@ -280,15 +281,15 @@ class Follower {
     return static_cast<std::size_t>(at - found_.refits.begin());
   }
 
-  /// Sets with @p part, followed again under the last errors where they were likely or are @p part itself; the others
-  /// are forgotten.
+  /// Sets with more than @p part, followed again under the last errors where they were likely; the others are
+  /// forgotten.
   void follow_again(const std::vector<int>& part) {
     const BaseFit& ground = *found_.beside.back().ground;
     for (Refit& refit : found_.refits) {
       const std::vector<int> effects = refit.hypothesis.effects;
-      if (!refit.solved || !is_part_of(part, effects)) continue;
+      if (!refit.solved || !is_part_of(part, effects) || effects == part) continue;
       Hypothesis& h = hypothesis_of(found_, effects);
-      if (h.probability >= worth_refitting || effects == part) {
+      if (h.probability >= worth_refitting) {
         tell("again with", effects);
         refit = refit_again(subject_.scene, ground, refit, found_.candidates, least_worth(ground));
         h = refit.hypothesis;
@@ -319,9 +320,13 @@ class Follower {
     } catch (const NumericalFailure&) {
       return false;  // those of the base fit have to do
     }
+    Refit again = refit_again(subject_.scene, *beside.ground, found_.refits[at], found_.candidates,
+                              -std::numeric_limits<double>::infinity());
+    if (!again.solved) return false;  // nor can what holds it be weighed under these
+    hypothesis_of(found_, part) = again.hypothesis;
+    found_.refits[at] = std::move(again);
     found_.beside.push_back(std::move(beside));
     follow_again(part);
-    if (!found_.refits[at].solved) return true;
     draw_from(at);
     for (std::size_t further = 0; further < most_on_from_first; ++further)
       if (!one_step_on_from_first()) break;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "common/error.h"
+#include "common/log_sum.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -15,11 +16,6 @@ constexpr double finest_mm = 0.1;  // a smaller discrepancy is as good as none
 double half_cauchy_below(double x, double scale) { return 2 / std::numbers::pi * std::atan(x / scale); }
 
 double normal_below(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
-
-double log_sum(const Eigen::VectorXd& logs) {
-  const double most = logs.maxCoeff();
-  return most + std::log((logs.array() - most).exp().sum());
-}
 
 }  // namespace
 
