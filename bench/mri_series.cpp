@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // Made series of drawn torsos through the automatic recipes, against what they were made of.
-//   bench_mri_series t1|fatsat|t2 FIRST COUNT [FOLDER]     a row per seed, then medians; with FOLDER the overlays of
-//   the worst bench_mri_series planted SEED                          planted failures and what is said
+//   bench_mri_series t1|fatsat|t2 FIRST COUNT [FOLDER]   a row per seed, then medians; the worst are drawn in FOLDER
+//   bench_mri_series planted SEED                        planted failures and what is said
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -65,6 +65,17 @@ double ml(const Mask& mask, const segmentation::Grid& grid) {
   return static_cast<double>(std::count(mask.begin(), mask.end(), 1)) * grid.voxel_volume_mm3() / 1000;
 }
 
+/// Where a ray from inside the chest leaves it.
+double true_radius_mm(const phantom::Torso& torso, const Eigen::Vector3d& centre, const Eigen::Vector3d& direction) {
+  constexpr double step_mm = 0.1, farthest_mm = 250;
+  double radius = 0;
+  for (; radius < farthest_mm; radius += step_mm) {
+    const Eigen::Vector3d p = centre + radius * direction;
+    if (p.y() < torso.chest_y_mm(p.x(), p.z())) break;
+  }
+  return radius;
+}
+
 /// Between the levels of the breasts and in front of a reader's end: there truth and result mean the same.
 Score score(const phantom::Torso& torso, const phantom::MadeSeries& made, const segmentation::RecipeResult& result) {
   const segmentation::Grid& grid = made.image.grid;
@@ -99,9 +110,12 @@ Score score(const phantom::Torso& torso, const phantom::MadeSeries& made, const 
   const segmentation::ChestWall& wall = result.walls.back();
   for (Eigen::Index k = 0; k < wall.radius_mm.cols(); ++k)
     for (Eigen::Index a = 0; a < wall.radius_mm.rows(); ++a) {
-      const Eigen::Vector3d p = wall.point(a, k);
-      if (p.z() < torso.low_z_mm() || p.z() > torso.high_z_mm() || std::abs(p.x()) > 110) continue;
-      off.push_back(std::abs(p.y() - torso.chest_y_mm(p.x(), p.z())));
+      if (wall.z(k) < torso.low_z_mm() || wall.z(k) > torso.high_z_mm()) continue;
+      const Eigen::Vector3d centre = wall.centre(k), direction = wall.direction(a);
+      const double true_mm = true_radius_mm(torso, centre, direction);
+      const Eigen::Vector3d there = centre + true_mm * direction;
+      if (std::abs(there.x()) > 110 || there.y() > torso.back_y_mm() - 10) continue;
+      off.push_back(std::abs(wall.radius_mm(a, k) - true_mm));
     }
   s.wall_median = percentile(off, 0.5);
   s.wall_95 = percentile(off, 0.95);
