@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/other_mesh.h"
 
+#include <vtkNew.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkStaticPointLocator.h>
+
 #include <algorithm>
-#include <cmath>
-#include <limits>
-#include <map>
-#include <tuple>
 #include <vector>
 
 #include "meshing/decimate/decimate.h"
@@ -43,55 +44,49 @@ reconstruction::Surface boundary_of(const TetMesh& mesh) {
   return surface;
 }
 
-Points cell_centres(const TetMesh& mesh) {
-  Points centres = Points::Zero(mesh.cells.rows(), 3);
-  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c)
-    for (int k = 0; k < 4; ++k) centres.row(c) += 0.25 * mesh.points.row(mesh.cells(c, k));
-  return centres;
-}
-
-/// Cell centres in cubes as wide as a search reaches.
-class CentreGrid {
+/// The cell of a mesh whose centre lies nearest to a place.
+class NearestCell {
  public:
-  CentreGrid(Points centres, double width_mm) : centres_(std::move(centres)), width_mm_(width_mm) {
-    for (Eigen::Index c = 0; c < centres_.rows(); ++c) cubes_[cube_of(centres_.row(c))].push_back(static_cast<int>(c));
+  explicit NearestCell(const TetMesh& mesh) {
+    vtkNew<vtkPoints> centres;
+    centres->SetDataTypeToDouble();
+    centres->SetNumberOfPoints(mesh.cells.rows());
+    for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
+      const Eigen::RowVector3d centre = mesh.points(mesh.cells.row(c).head<4>(), Eigen::all).colwise().mean();
+      centres->SetPoint(c, centre.data());
+    }
+    points_->SetPoints(centres);
+    locator_->SetDataSet(points_);
+    locator_->BuildLocator();
   }
 
-  /// Nearest centre: rings of cubes until none further out can be nearer.
-  int nearest(const Eigen::RowVector3d& place) const {
-    const auto [i, j, k] = cube_of(place);
-    int best = 0;
-    double least = std::numeric_limits<double>::infinity();
-    for (int reach = 1; reach < 64; reach *= 2) {
-      for (int a = i - reach; a <= i + reach; ++a)
-        for (int b = j - reach; b <= j + reach; ++b)
-          for (int c = k - reach; c <= k + reach; ++c) look({a, b, c}, place, best, least);
-      if (least < std::numeric_limits<double>::infinity()) return best;
-    }
-    return best;
-  }
+  Eigen::Index at(const Eigen::RowVector3d& place) const { return locator_->FindClosestPoint(place.data()); }
 
  private:
-  using Cube = std::tuple<int, int, int>;
-
-  Cube cube_of(const Eigen::RowVector3d& p) const {
-    const auto cell = [this](double x) { return static_cast<int>(std::floor(x / width_mm_)); };
-    return {cell(p[0]), cell(p[1]), cell(p[2])};
-  }
-
-  void look(const Cube& cube, const Eigen::RowVector3d& place, int& best, double& least) const {
-    const auto found = cubes_.find(cube);
-    if (found == cubes_.end()) return;
-    for (const int c : found->second) {
-      const double distance = (centres_.row(c) - place).squaredNorm();
-      if (distance < least) least = distance, best = c;
-    }
-  }
-
-  Points centres_;
-  double width_mm_;
-  std::map<Cube, std::vector<int>> cubes_;
+  vtkNew<vtkPolyData> points_;
+  vtkNew<vtkStaticPointLocator> locator_;
 };
+
+/// Fractions of the tissues and parts of @p mesh in the cells of @p other: means over four places in each, those of the
+/// quadrature rule of degree 2.
+void take_tissues(const TetMesh& mesh, TetMesh& other) {
+  constexpr double own = 0.5854101966249685, rest = (1 - own) / 3;
+  const NearestCell nearest(mesh);
+  other.tissue.resize(other.cells.rows());
+  other.fraction = Table::Zero(other.cells.rows(), mesh.fraction.cols());
+  other.part_fraction = Table::Zero(other.cells.rows(), mesh.part_fraction.cols());
+  for (Eigen::Index c = 0; c < other.cells.rows(); ++c) {
+    const Points corners = other.points(other.cells.row(c).head<4>(), Eigen::all);
+    for (int a = 0; a < 4; ++a) {
+      const Eigen::Index from = nearest.at(rest * corners.colwise().sum() + (own - rest) * corners.row(a));
+      other.fraction.row(c) += mesh.fraction.row(from) / 4;
+      if (mesh.part_fraction.cols() > 0) other.part_fraction.row(c) += mesh.part_fraction.row(from) / 4;
+    }
+    Eigen::Index most = 0;
+    other.fraction.row(c).maxCoeff(&most);
+    other.tissue[c] = static_cast<int>(most);
+  }
+}
 
 /// Tetrahedra inside @p surface with the tissues of @p mesh.
 TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const TetMesh& mesh,
@@ -103,17 +98,7 @@ TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const Tet
   other.support_names = mesh.support_names;
   other.muscle_support = mesh.muscle_support;
   other.part_names = mesh.part_names;
-  const CentreGrid grid(cell_centres(mesh), edge_mm);
-  const Points centres = cell_centres(other);
-  other.tissue.resize(other.cells.rows());
-  other.fraction.resize(other.cells.rows(), mesh.fraction.cols());
-  other.part_fraction.resize(other.cells.rows(), mesh.part_fraction.cols());
-  for (Eigen::Index c = 0; c < other.cells.rows(); ++c) {
-    const int from = grid.nearest(centres.row(c));
-    other.tissue[c] = mesh.tissue[from];
-    other.fraction.row(c) = mesh.fraction.row(from);
-    if (mesh.part_fraction.cols() > 0) other.part_fraction.row(c) = mesh.part_fraction.row(from);
-  }
+  take_tissues(mesh, other);
   if (mesh.order() == 2) {
     other = meshing::to_quadratic(other);
     meshing::CurveOptions onto_its_faces;

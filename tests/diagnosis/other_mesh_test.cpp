@@ -60,5 +60,45 @@ TEST(OtherMesh, IsFinerAtTheSkinsEndThanTheMeshIsThere) {
   }
 }
 
+/// A ball of gland: one in cells whose centre lies inside, by half in those at its border.
+void put_gland(TetMesh& mesh, const Eigen::RowVector3d& middle, double radius_mm) {
+  constexpr auto fat = static_cast<int>(segmentation::Tissue::adipose),
+                 gland = static_cast<int>(segmentation::Tissue::gland);
+  mesh.fraction.setZero();
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) {
+    int inside = 0;
+    for (int a = 0; a < 4; ++a) inside += (mesh.points.row(mesh.cells(c, a)) - middle).norm() < radius_mm;
+    mesh.fraction(c, gland) = 0.25 * inside;
+    mesh.fraction(c, fat) = 1 - 0.25 * inside;
+    mesh.tissue[c] = inside > 2 ? gland : fat;
+  }
+}
+
+double gland_mm3(const TetMesh& mesh) {
+  double sum = 0;
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c)
+    sum += mesh.fraction(c, static_cast<int>(segmentation::Tissue::gland)) *
+           meshing::cell_volume_mm3(mesh.points, mesh.cells, c);
+  return sum;
+}
+
+TEST(OtherMesh, HoldsAsMuchOfATissueWhereItIs) {
+  TetMesh mesh = testing::dome_mesh({.rings = 8, .layers = 4});
+  const Eigen::RowVector3d middle = 0.5 * (mesh.points.colwise().minCoeff() + mesh.points.colwise().maxCoeff());
+  const double size_mm = (mesh.points.colwise().maxCoeff() - mesh.points.colwise().minCoeff()).minCoeff();
+  put_gland(mesh, middle, 0.3 * size_mm);
+  const double gland = gland_mm3(mesh);
+  const meshing::Anatomy anatomy = meshing::compute_anatomy(mesh, "left");
+  for (const TetMesh& other : {other_mesh(mesh, anatomy, 0.5), coarser_mesh(mesh, anatomy, 0.5)}) {
+    EXPECT_NEAR(gland_mm3(other) / gland, 1, 0.03);
+    for (Eigen::Index c = 0; c < other.cells.rows(); ++c) {
+      EXPECT_NEAR(other.fraction.row(c).sum(), 1, 1e-12);
+      const Eigen::RowVector3d centre = other.points(other.cells.row(c).head<4>(), Eigen::all).colwise().mean();
+      const bool far = (centre - middle).norm() > 0.8 * size_mm;
+      EXPECT_TRUE(!far || other.tissue[c] == static_cast<int>(segmentation::Tissue::adipose)) << centre;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace supine::diagnosis
