@@ -143,8 +143,9 @@ void check_frame(const Scan& scan, const ModelSkin& model, const reconstruction:
   if (negated * (behind > most_behind ? flip_gain_from_behind : flip_gain) < as_is) {
     throw InputError(fmt::format(
         "{}: lies {:.1f} mm from the model's skin (median){}; with x and y negated it "
-        "lies {:.1f} mm from it. Its coordinates are RAS: negate x and y, or name the frame in the file (PLY, OBJ: a "
-        "comment line \"frame RAS, unit mm\")",
+        "lies {:.1f} mm from it. Its coordinates are in the other frame: where the file names its frame (PLY, OBJ: a "
+        "comment line \"frame RAS, unit mm\"; STL: SPACE=), correct that; where it names none, add it, or negate x and "
+        "y",
         name, as_is, muscle.triangles.rows() > 0 ? fmt::format(", {:.0f} % of it behind the muscle", 100 * behind) : "",
         negated));
   }

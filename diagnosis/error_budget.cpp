@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/error_budget.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -50,6 +51,11 @@ ErrorBudget error_budget(const Findings& found) {
   budget.patchiness = found.base.patchiness_mm;
   budget.model_form = found.unexplained.mean_mm;
   return budget;
+}
+
+bool mesh_errs_most(const ErrorBudget& budget) {
+  return budget.numerical >
+         std::max({budget.noise, budget.registration, budget.parameters, budget.patchiness, budget.model_form});
 }
 
 }  // namespace supine::diagnosis

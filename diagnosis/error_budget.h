@@ -15,4 +15,7 @@ struct ErrorBudget {
 
 ErrorBudget error_budget(const Findings& found);
 
+/// Whether a finer mesh is what would show most: the mesh errs by more than each of the others.
+bool mesh_errs_most(const ErrorBudget& budget);
+
 }  // namespace supine::diagnosis

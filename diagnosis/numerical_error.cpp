@@ -228,7 +228,7 @@ Eigen::VectorXd change_on(const calibration::MeasuredScene& scene, const simulat
 void measure_on_two(const calibration::MeasuredScene& scene, const simulation::Model& model,
                     const calibration::Fit& fit, const NumericalError* near, NumericalError& result) {
   const auto finer = [&] {
-    const auto make = [&] { return other_mesh(*scene.mesh, *scene.anatomy, edge_share); };
+    const auto make = [&] { return other_mesh(*scene.mesh, edge_share); };
     result.finer_mm = change_on(scene, model, fit, near ? &near->on_finer : nullptr, make, result.on_finer);
   };
   const auto coarser = [&] {

@@ -13,7 +13,6 @@
 #include "meshing/tetrahedra/curve.h"
 #include "meshing/tetrahedra/face_pieces.h"
 #include "meshing/tetrahedra/grade.h"
-#include "meshing/tetrahedra/ligament_ring.h"
 #include "meshing/tetrahedra/tetrahedralise.h"
 #include "meshing/topology.h"
 
@@ -23,7 +22,8 @@ namespace {
 using meshing::TetMesh;
 using reconstruction::Region;
 
-/// The boundary's corner triangles on points of their own. The ring is marked anew later.
+/// The boundary's corner triangles on points of their own. The ligament's ring, which nothing but pictures knows, is
+/// not marked.
 reconstruction::Surface boundary_of(const TetMesh& mesh) {
   reconstruction::Surface surface;
   std::vector<int> of_node(static_cast<std::size_t>(mesh.points.rows()), -1), nodes;
@@ -89,8 +89,7 @@ void take_tissues(const TetMesh& mesh, TetMesh& other) {
 }
 
 /// Tetrahedra inside @p surface with the tissues of @p mesh.
-TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const TetMesh& mesh,
-               const meshing::Anatomy& anatomy) {
+TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const TetMesh& mesh) {
   meshing::TetrahedraliseOptions options;
   options.edge_mm = edge_mm;
   TetMesh other = meshing::tetrahedralise(surface, options, "the boundary of the mesh");
@@ -105,18 +104,17 @@ TetMesh filled(const reconstruction::Surface& surface, double edge_mm, const Tet
     onto_its_faces.smooth_share = 0;  // no voxels' noise in them
     meshing::curve_boundary(other, meshing::face_pieces(mesh), nullptr, onto_its_faces);
   }
-  if (!anatomy.is_object()) meshing::mark_ligament_ring(other, anatomy);
   return other;
 }
 
 }  // namespace
 
-TetMesh other_mesh(const TetMesh& mesh, const meshing::Anatomy& anatomy, double skin_edge_share) {
+TetMesh other_mesh(const TetMesh& mesh, double skin_edge_share) {
   const reconstruction::Surface surface = boundary_of(mesh);
   const double edge_mm = meshing::mean_edge_mm(surface);
   const double now_mm = meshing::skin_edge_mm(surface);  // shorter than the others where they were made so before
   const double wanted_mm = skin_edge_share * (now_mm > 0 ? std::min(edge_mm, now_mm) : edge_mm);
-  return filled(meshing::refine_skin_edge(surface, wanted_mm), edge_mm, mesh, anatomy);
+  return filled(meshing::refine_skin_edge(surface, wanted_mm), edge_mm, mesh);
 }
 
 TetMesh coarser_mesh(const TetMesh& mesh, const meshing::Anatomy& anatomy, double triangle_share) {
@@ -128,7 +126,7 @@ TetMesh coarser_mesh(const TetMesh& mesh, const meshing::Anatomy& anatomy, doubl
   options.method = meshing::DecimateMethod::triangles;
   if (anatomy.is_object()) options.sharp_deg = 40;  // a body from CAD keeps its edges
   const reconstruction::Surface coarse = meshing::decimate(surface, options).surface;
-  return filled(coarse, meshing::mean_edge_mm(coarse), mesh, anatomy);
+  return filled(coarse, meshing::mean_edge_mm(coarse), mesh);
 }
 
 }  // namespace supine::diagnosis

@@ -14,7 +14,7 @@ namespace supine::diagnosis {
 /// @p mesh. Of the same order as @p mesh; quadratic ones are bent onto its boundary.
 /// @param skin_edge_share  edge at the skin's end over what it is in @p mesh (the mean edge at the most), in (0, 1)
 /// @throws InputError  when the boundary of @p mesh cannot be filled anew
-meshing::TetMesh other_mesh(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, double skin_edge_share);
+meshing::TetMesh other_mesh(const meshing::TetMesh& mesh, double skin_edge_share);
 
 /// The same body on another, coarser surface.
 /// @param triangle_share  triangles aimed at over those of @p mesh, in (0, 1)

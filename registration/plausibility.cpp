@@ -340,6 +340,11 @@ std::string check_readings(const Readings& readings, const std::string& pose, bo
                     name, given, readings.better->words, readings.better->misfit_mm, pose));
   }
   constexpr double fits_nothing_mm = 8;
+  if (!std::isfinite(readings.given.misfit_mm))
+    throw InputError(fmt::format(
+        "{}: too few of its points come to lie over the skin of the {} shape to say whether it fits, as given "
+        "or read in any other way. Is it a scan of this body, whole, with axes and unit as measured?",
+        name, pose));
   if (!(readings.given.misfit_mm <= fits_nothing_mm))
     throw InputError(
         fmt::format("{}: does not fit the {} shape ({:.1f} mm off, RMS, bound {:g}, no point counting for more than "

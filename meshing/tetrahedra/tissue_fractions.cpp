@@ -91,6 +91,56 @@ void check_fit(const TetMesh& mesh, const std::vector<double>& outside, Fraction
       100 * report.outside_share, place.x(), place.y(), place.z(), 100 * most_outside));
 }
 
+/// Volume and middle of a body.
+struct Bulk {
+  double mm3 = 0;
+  Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
+  void add(double volume_mm3, const Eigen::RowVector3d& place) {
+    mm3 += volume_mm3;
+    middle += volume_mm3 / mm3 * (place - middle);
+  }
+};
+
+/// What is meshed of the labels around the mesh: elsewhere there may be another breast.
+Bulk bulk_of_labels(const TetMesh& mesh, const LabelImage& labels) {
+  constexpr double around_mm = 10;
+  const Eigen::RowVector3d low = mesh.points.colwise().minCoeff().array() - around_mm,
+                           high = mesh.points.colwise().maxCoeff().array() + around_mm;
+  const segmentation::Grid& grid = labels.grid;
+  Bulk bulk;
+  for (int k = 0; k < grid.size.z(); ++k)
+    for (int j = 0; j < grid.size.y(); ++j)
+      for (int i = 0; i < grid.size.x(); ++i) {
+        if (!meshed(labels.voxels[grid.index(i, j, k)])) continue;
+        const Eigen::RowVector3d place = grid.point(Eigen::Vector3d(i, j, k)).transpose();
+        if ((place.array() >= low.array()).all() && (place.array() <= high.array()).all())
+          bulk.add(grid.voxel_volume_mm3(), place);
+      }
+  return bulk;
+}
+
+/// Refuses labels of another body, another place or another size that the mesh happens to lie in.
+void check_bulk(const TetMesh& mesh, const LabelImage& labels) {
+  constexpr double factor = 1.25, farthest_mm = 5;
+  Bulk body;
+  for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c)
+    body.add(cell_volume_mm3(mesh.points, mesh.cells, c),
+             mesh.points(mesh.cells.row(c).head(4), Eigen::all).colwise().mean());
+  const Bulk tissue = bulk_of_labels(mesh, labels);
+  const std::string question = "are surface and labels of the same case, from one run?";
+  if (tissue.mm3 > factor * body.mm3 || body.mm3 > factor * tissue.mm3)
+    throw InputError(
+        fmt::format("the labels hold {:.0f} ml of tissue where the mesh lies, which holds {:.0f} ml "
+                    "(bound: a factor of {}): {}",
+                    tissue.mm3 / 1000, body.mm3 / 1000, factor, question));
+  const Eigen::RowVector3d off = tissue.middle - body.middle;
+  if (off.norm() > farthest_mm)
+    throw InputError(
+        fmt::format("the middle of the labels' tissue lies ({:.1f}, {:.1f}, {:.1f}) mm from that of the "
+                    "mesh (bound {} mm): {}",
+                    off.x(), off.y(), off.z(), farthest_mm, question));
+}
+
 /// Adds a voxel to the tissues it holds. @param gland_share  of a voxel of fat or gland; NaN = by the label alone
 void count_voxel(int tissue, float gland_share, std::array<double, segmentation::tissue_count>& hits) {
   const bool mixed = tissue == static_cast<int>(Tissue::adipose) || tissue == static_cast<int>(Tissue::gland);
@@ -149,6 +199,7 @@ FractionReport assign_tissue(TetMesh& mesh, const LabelImage& labels, std::span<
   }
   FractionReport report;
   check_fit(mesh, outside, report);
+  check_bulk(mesh, labels);
   std::array<double, segmentation::tissue_count> voxels{};
   for (std::size_t v = 0; v < labels.voxels.size(); ++v)
     if (meshed(labels.voxels[v])) count_voxel(labels.voxels[v], gland_share.empty() ? NAN : gland_share[v], voxels);

@@ -30,7 +30,8 @@ const std::vector<Eigen::RowVector4d>& cell_samples();
 ///   rest as fat, whichever their label; empty = by label
 /// @throws InputError  more than 5 % of the mesh's volume is nowhere near meshed tissue: the labels are another case's,
 /// or in
-///   another frame
+///   another frame; what is meshed of them around the mesh is more than 1.25 times as much as the mesh holds, or less,
+///   or its middle lies more than 5 mm elsewhere
 FractionReport assign_tissue(TetMesh& mesh, const segmentation::LabelImage& labels,
                              std::span<const float> gland_share = {});
 

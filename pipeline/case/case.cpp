@@ -14,6 +14,7 @@
 #include "common/suggestion.h"
 #include "common/toml_reader.h"
 #include "pipeline/case/case_image.h"
+#include "segmentation/tissue.h"
 #include "simulation/catalogue.h"
 
 namespace supine::pipeline {
@@ -122,6 +123,29 @@ void check_pose_name(const TomlReader& poses, const std::string& name) {
     poses.fail(name, "this name belongs to a file the tools write; give the pose another");
 }
 
+/// Whether files of a pose of this name would be those that belong to another pose of the case, or to none.
+bool takes_names_of(const std::string& name, const std::string& other) {
+  if (name == "comparison_" + other || name == "scan_" + other) return true;
+  if (!name.starts_with(other + "_")) return false;
+  const std::string_view end = std::string_view(name).substr(other.size() + 1);
+  constexpr std::string_view further[] = {"landmarks", "displacement", "calculix", "febio", "sofa"};
+  return std::find(std::begin(further), std::end(further), end) != std::end(further) ||
+         std::find(segmentation::tissue_names.begin(), segmentation::tissue_names.end(), end) !=
+             segmentation::tissue_names.end();
+}
+
+void check_file_names(const TomlReader& poses, const Case& result) {
+  for (const Pose& pose : result.poses) {
+    std::vector<std::string> others = {undeformed};
+    for (const Pose& other : result.poses) others.push_back(other.name);
+    for (const std::string& other : others)
+      if (takes_names_of(pose.name, other))
+        poses.fail(pose.name, fmt::format("files of this pose would have the names of files that belong to pose '{}'; "
+                                          "give it another name",
+                                          other));
+  }
+}
+
 /// Two scans of an object under the same load are two measurements of it.
 void check_directions_differ(const TomlReader& poses, const Case& result) {
   const std::vector<Pose>& all = result.poses;
@@ -211,6 +235,7 @@ void read_poses(const TomlReader& file, Case& result) {
         poses->fail(name, fmt::format("differs from [pose.{}] in capitals only; give it another name", before.name));
     result.poses.push_back(read_pose(*pose, name, result));
   }
+  check_file_names(*poses, result);
   check_directions_differ(*poses, result);
   if (!result.is_object()) check_files_differ(*poses, result);
 }
@@ -220,10 +245,17 @@ void read_landmark_table(const TomlReader& file, Case& result) {
     landmarks->allow({result.imaged_pose});
     if (landmarks->has(result.imaged_pose)) result.prone_landmarks = case_path(*landmarks, result.imaged_pose, false);
   }
+  const auto poses = file.sub_table("pose");
+  for (const Pose& pose : result.poses)
+    if (result.prone_landmarks && pose.landmarks && same_content(*pose.landmarks, *result.prone_landmarks))
+      poses->sub_table(pose.name)->fail(
+          "landmarks", fmt::format("holds the same as {} of [landmarks], the places in the image; each pose has a "
+                                   "measurement of its own",
+                                   result.imaged_pose));
   if (result.prone_landmarks) return;
   for (const Pose& pose : result.poses)
     if (pose.landmarks)
-      file.sub_table("pose")->sub_table(pose.name)->fail(
+      poses->sub_table(pose.name)->fail(
           "landmarks", fmt::format("needs the {0} position of the same points: add [landmarks] with {0} = \"FILE.csv\"",
                                    result.imaged_pose));
 }
@@ -238,6 +270,12 @@ std::vector<std::string> default_calibrated(const Case& result) {
   return measured;
 }
 
+/// @throws InputError  a name twice
+void check_listed_once(const TomlReader& table, std::string_view key, const std::vector<std::string>& names) {
+  for (auto name = names.begin(); name != names.end(); ++name)
+    if (std::find(names.begin(), name, *name) != name) table.fail(key, fmt::format("\"{}\" is listed twice", *name));
+}
+
 void read_calibration(const TomlReader& file, Case& result) {
   result.calibrated_poses = default_calibrated(result);
   const auto calibration = file.sub_table("calibration");
@@ -246,16 +284,15 @@ void read_calibration(const TomlReader& file, Case& result) {
   const auto names = calibration->texts("poses");
   if (!names) return;
   if (names->empty()) calibration->fail("poses", "lists no pose; leave the key out to fit supine");
-  for (auto name = names->begin(); name != names->end(); ++name) {
+  for (const std::string& name : *names) {
     const auto pose =
-        std::find_if(result.poses.begin(), result.poses.end(), [&](const Pose& p) { return p.name == *name; });
-    if (pose == result.poses.end()) calibration->fail("poses", fmt::format("there is no [pose.{}]", *name));
+        std::find_if(result.poses.begin(), result.poses.end(), [&](const Pose& p) { return p.name == name; });
+    if (pose == result.poses.end()) calibration->fail("poses", fmt::format("there is no [pose.{}]", name));
     if (pose->name == result.imaged_pose)
-      calibration->fail("poses", fmt::format("\"{}\" is the imaged pose: nothing of it is predicted", *name));
-    if (!pose->surface) calibration->fail("poses", fmt::format("[pose.{}] has no surface to fit", *name));
-    if (std::find(names->begin(), name, *name) != name)
-      calibration->fail("poses", fmt::format("\"{}\" is listed twice", *name));
+      calibration->fail("poses", fmt::format("\"{}\" is the imaged pose: nothing of it is predicted", name));
+    if (!pose->surface) calibration->fail("poses", fmt::format("[pose.{}] has no surface to fit", name));
   }
+  check_listed_once(*calibration, "poses", *names);
   result.calibrated_poses = *names;
 }
 
@@ -269,9 +306,11 @@ void read_register(const TomlReader& file, Case& result) {
     for (const std::string& name : *on)
       if (std::find(known.begin(), known.end(), name) == known.end())
         table->fail("on", fmt::format("\"{}\" is none of {}", name, listed(known)));
+    check_listed_once(*table, "on", *on);
     result.register_on.on = *on;
   }
   result.register_on.rigid = table->texts("rigid").value_or(std::vector<std::string>());
+  check_listed_once(*table, "rigid", result.register_on.rigid);
 }
 
 void read_head(const TomlReader& file, Case& result) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/case/case_inputs.h"
 
+#include <fmt/core.h>
+
 #include "meshing/imaged_mesh.h"
 #include "pipeline/case/model_checks.h"
 
@@ -20,6 +22,8 @@ CaseInputs read_case_inputs(Run& run, const fs::path& folder, const fs::path& me
   inputs.mesh = meshing::read_imaged_mesh(run.input(mesh_file), inputs.description.side);
   inputs.anatomy = meshing::compute_anatomy(inputs.mesh, inputs.description.side, inputs.description.imaged_pose);
   check_inputs(inputs);
+  if (const std::string doubt = doubt_of_skin(inputs.model); !inputs.description.is_object() && !doubt.empty())
+    run.warn(fmt::format("{}: {}", inputs.model_text.file.string(), doubt));
   return inputs;
 }
 

@@ -19,4 +19,14 @@ void check_weight(const simulation::Model& model, const meshing::Anatomy& anatom
       file.string(), modulus_kpa, load, anatomy.mound_height_mm, least));
 }
 
+std::string doubt_of_skin(const simulation::Model& model) {
+  const double skin_kpa = model.skin.young_modulus_kpa.value, tissue_kpa = model.breast.young_modulus_kpa.value;
+  if (skin_kpa >= tissue_kpa) return {};
+  return fmt::format(
+      "skin.young_modulus_kpa = {:g} kPa is softer than the tissue under it ({:g} kPa), so that it is as if there were "
+      "no "
+      "skin; skin has 5 to 500 kPa. Was it written in MPa?",
+      skin_kpa, tissue_kpa);
+}
+
 }  // namespace supine::pipeline

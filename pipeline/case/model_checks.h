@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "meshing/anatomy.h"
 #include "simulation/model.h"
@@ -13,5 +14,8 @@ namespace supine::pipeline {
 /// @param file  of the model, for the message
 /// @throws InputError  with modulus, weight and height
 void check_weight(const simulation::Model& model, const meshing::Anatomy& anatomy, const std::filesystem::path& file);
+
+/// What to doubt of a skin that is softer than the tissue under it, as one in MPa is. Empty: nothing.
+std::string doubt_of_skin(const simulation::Model& model);
 
 }  // namespace supine::pipeline

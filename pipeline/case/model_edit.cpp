@@ -37,22 +37,30 @@ const Effect& known_effect(const std::string& name) {
                                nearest.empty() ? "there are " + listed(names) : "did you mean " + nearest + "?"));
 }
 
+bool starts_table(const std::string& line) {
+  const auto first = line.find_first_not_of(" \t");
+  return first != std::string::npos && line[first] == '[';
+}
+
 /// First line (0-based) of the block of the effect, or -1.
+/// @throws InputError  effects that are no blocks
 int effect_line(const ModelText& model, const std::string& name) {
   const toml::table table = parse_toml(model.text, model.file);
   const toml::array* entries = table.get_as<toml::array>("effect");
   if (!entries) return -1;
+  const std::vector<std::string> lines = split_lines(model.text);
+  int found = -1;
   for (const toml::node& entry : *entries) {
+    const auto line = static_cast<int>(entry.source().begin.line) - 1;
+    if (!starts_table(lines[static_cast<std::size_t>(line)]))
+      throw InputError(fmt::format(
+          "{}:{}: `effect` is one list here, which is read but not edited: write each effect as a block that begins "
+          "with [[effect]]",
+          model.file.string(), line + 1));
     const toml::table* effect = entry.as_table();
-    if (effect && (*effect)["name"].value_or(std::string_view()) == name)
-      return static_cast<int>(effect->source().begin.line) - 1;
+    if (effect && (*effect)["name"].value_or(std::string_view()) == name) found = line;
   }
-  return -1;
-}
-
-bool starts_table(const std::string& line) {
-  const auto first = line.find_first_not_of(" \t");
-  return first != std::string::npos && line[first] == '[';
+  return found;
 }
 
 bool is_comment_or_blank(const std::string& line) {
@@ -88,12 +96,14 @@ const toml::table* section_of(const toml::table& file, const std::string& sectio
   return nullptr;
 }
 
-/// Where the number of a parameter stands in the file, whether it is fixed (name = 1) or free (name = { value = 1 }).
+/// Where the number of a parameter stands in the file, whether it is fixed (name = 1) or free (name = { value = 1 }),
+/// or one of its bounds (name.lower).
 toml::source_region value_place(const toml::table& table, const fs::path& file, const std::string& name) {
-  const auto dot = name.find('.');
+  const auto dot = name.find('.'), second = name.find('.', dot + 1);
   const toml::table* section = section_of(table, name.substr(0, dot));
-  const toml::node* value = section ? section->get(name.substr(dot + 1)) : nullptr;
-  if (value != nullptr && value->is_table()) value = value->as_table()->get("value");
+  const toml::node* value = section ? section->get(name.substr(dot + 1, second - dot - 1)) : nullptr;
+  if (value != nullptr && value->is_table())
+    value = value->as_table()->get(second == std::string::npos ? "value" : name.substr(second + 1));
   if (value == nullptr || !value->is_number())
     throw InputError(fmt::format("{} holds no number {}, so it cannot be replaced; write one", file.string(), name));
   return value->source();

@@ -24,7 +24,7 @@ std::string without_effect(const ModelText& model, const std::string& name);
 
 /// The text of a model.toml with other values of parameters, fixed or free; everything else, comments too, stays byte
 /// for byte.
-/// @param values  by name (parameters.h), written with all their digits
+/// @param values  by name (parameters.h), of a bound NAME.lower or NAME.upper; written with all their digits
 /// @throws InputError  a parameter whose number the text does not hold
 std::string with_values(const ModelText& model, const std::map<std::string, double>& values);
 

@@ -217,6 +217,28 @@ void read_effects(const TomlReader& file, Model& model) {
   }
 }
 
+/// Refuses a free number that nothing depends on: a fit would give it an interval all the same.
+void check_free_numbers_act(const TomlReader& file, const Model& model) {
+  const auto check = [](const TomlReader& section, const std::string& key, const Setting& setting, const char* with) {
+    if (setting.free)
+      section.fail(
+          key, fmt::format("is free, but nothing depends on it with {}: write it as a number, or change that", with));
+  };
+  if (model.interface.kind == simulation::InterfaceKind::fixed && model.supports.empty()) {
+    const auto section = file.sub_table("interface");
+    check(*section, "normal_kpa_per_mm", model.interface.normal_kpa_per_mm, "kind = \"fixed\"");
+    check(*section, "tangential_kpa_per_mm", model.interface.tangential_kpa_per_mm, "kind = \"fixed\"");
+  }
+  if (model.cut.kind == simulation::CutKind::held)
+    check(*file.sub_table("cut"), "stiffness_kpa_per_mm", model.cut.stiffness_kpa_per_mm, "kind = \"held\"");
+  for (const simulation::EffectSetting& effect : model.effects) {
+    const auto tie = effect.options.find("tie");
+    const auto stiffness = effect.parameters.find("stiffness_kpa_per_mm");
+    if (tie != effect.options.end() && tie->second == "rigid" && stiffness != effect.parameters.end())
+      check(file, effect.name + ".stiffness_kpa_per_mm", stiffness->second, "tie = \"rigid\"");
+  }
+}
+
 diagnosis::Patchiness patchiness_of(const TomlReader& file) {
   constexpr Bounds share{.lower = 0, .upper = 2}, length{.lower = 5, .upper = 200}, depth{.lower = 0, .upper = 10};
   diagnosis::Patchiness patchiness;
@@ -254,6 +276,7 @@ simulation::Model read_model(const ModelText& given) {
   read_supports(file, model);
   read_contact(file, model);
   read_effects(file, model);
+  check_free_numbers_act(file, model);
   patchiness_of(file);  // complains of what is wrong there
   return model;
 }

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -11,20 +10,29 @@
 
 namespace supine::pipeline {
 
+std::optional<Eigen::Vector3d> gravity_of_shape(const nlohmann::ordered_json& sidecar) {
+  if (!sidecar.is_object() || !sidecar.contains("gravity")) return std::nullopt;
+  const nlohmann::ordered_json& used = sidecar["gravity"];
+  if (!used.is_array() || used.size() != 3) return std::nullopt;
+  Eigen::Vector3d gravity;
+  for (int k = 0; k < 3; ++k) {
+    if (!used[k].is_number()) return std::nullopt;
+    gravity[k] = used[k];
+  }
+  return gravity;
+}
+
+bool is_of_other_gravity(const nlohmann::ordered_json& sidecar, const Pose& pose) {
+  constexpr double rounded = 1e-6;
+  const auto used = gravity_of_shape(sidecar);
+  return used && (*used - pose.gravity).norm() > rounded;
+}
+
 void check_gravity(const std::filesystem::path& shape, const Pose& pose) {
   std::ifstream stream(std::filesystem::path(shape).replace_extension(".json"));
-  const auto figures = nlohmann::json::parse(stream, nullptr, false);
-  if (!figures.is_object() || !figures.contains("gravity")) return;
-  const nlohmann::json& used = figures["gravity"];
-  if (!used.is_array() || used.size() != 3) return;
-  Eigen::Vector3d then;
-  for (int k = 0; k < 3; ++k) {
-    if (!used[k].is_number()) return;
-    then[k] = used[k];
-  }
-  constexpr double rounded = 1e-6;
-  const Eigen::Vector3d& now = pose.gravity;
-  if ((then - now).norm() <= rounded) return;
+  const auto figures = nlohmann::ordered_json::parse(stream, nullptr, false);
+  if (!is_of_other_gravity(figures, pose)) return;
+  const Eigen::Vector3d then = *gravity_of_shape(figures), now = pose.gravity;
   throw InputError(fmt::format(
       "{}: was computed with gravity ({:g}, {:g}, {:g}), and case.toml gives [pose.{}] ({:g}, {:g}, {:g}): simulate "
       "again, or correct it there",

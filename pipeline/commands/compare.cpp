@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "calibration/comparison_files.h"
+#include "calibration/measured_landmarks.h"
 #include "calibration/scan_motion.h"
 #include "common/error.h"
 #include "meshing/anatomy.h"
@@ -18,6 +19,7 @@
 #include "pipeline/case/shape_gravity.h"
 #include "pipeline/picture/picture.h"
 #include "pipeline/results/targets_report.h"
+#include "pipeline/tool/lineage.h"
 #include "pipeline/tool/tool.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/catalogue.h"
@@ -126,7 +128,12 @@ class CompareTool : public Tool {
     inputs.predicted = meshing::read_pose(run.input(pose_file_), pose_name_.empty() ? inputs.pose.name : "");
     check_gravity(pose_file_, inputs.pose);
     inputs.surface = reconstruction::read_surface(run.input(*inputs.pose.surface), inputs.measured.frame);
-    if (!model_file_.empty()) inputs.model = read_model(run.input(model_file_));
+    if (!model_file_.empty()) {
+      inputs.model = read_model(run.input(model_file_));
+      if (made_from_another(pose_file_, model_file_))
+        run.warn(fmt::format("{} was computed with another {} than {}: simulate again with that", pose_file_.string(),
+                             model_file_.filename().string(), model_file_.string()));
+    }
     return inputs;
   }
 
@@ -162,11 +169,30 @@ class CompareTool : public Tool {
     }
     Landmarks measured = read_landmarks(run.input(*inputs.pose.landmarks), inputs.measured.frame);
     measured.points = motion.corrected(measured.points);
+    const Landmarks carried = read_landmarks(run.input(predicted));
+    if (inputs.measured.prone_landmarks && made_from_another(predicted, *inputs.measured.prone_landmarks))
+      run.warn(fmt::format("{} was made from another {}: simulate again", predicted.string(),
+                           inputs.measured.prone_landmarks->filename().string()));
     try {
-      return calibration::compare_landmarks(read_landmarks(run.input(predicted)), measured);
+      const auto errors = calibration::compare_landmarks(carried, measured);
+      doubt_landmarks(run, *inputs.pose.landmarks, carried, measured);
+      return errors;
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", inputs.pose.landmarks->string(), error.what()));
     }
+  }
+
+  /// What calibration would refuse or doubt is told, and no more: a model that is far off may be what is to be seen.
+  static void doubt_landmarks(Run& run, const fs::path& file, const Landmarks& carried, const Landmarks& measured) {
+    const auto pairs = calibration::pair_landmarks(carried, measured);
+    std::string doubt;
+    try {
+      calibration::check_landmarks(pairs, pairs.imaged);
+      doubt = calibration::doubt_of_scale(pairs, pairs.imaged);
+    } catch (const InputError& refused) {
+      doubt = refused.what();
+    }
+    if (!doubt.empty()) run.warn(fmt::format("{}: {}", file.string(), doubt));
   }
 
   /// With what else is known of the pose, where --expected names it.

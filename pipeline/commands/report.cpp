@@ -47,6 +47,10 @@ class ReportTool : public Tool {
     run.output(target);  // before the work, so that nobody waits for what cannot be written
     const Collected collected = collect(measured, places.case_folder, places.out);
     const auto stages = stages_of(measured, collected, places);
+    for (const Stage& stage : stages)
+      if (!stage.stale.empty())
+        run.warn(
+            fmt::format("{}; run {}", stage.stale, stage.name == "sensitivity" ? "it again" : places.make(stage.name)));
     run.stage("shapes");
     Json data = about(measured);
     try {

@@ -100,8 +100,7 @@ class SimulateTool : public Tool {
     search.progress = [&run](double kpa) { run.progress(fmt::format("breast.young_modulus_kpa = {:.3g}", kpa)); };
     const auto found = simulation::find_carrying_modulus(in.mesh, in.anatomy, in.model, loads, search);
     const fs::path target = folder() / "model.toml";
-    std::ofstream(run.output(target), std::ios::binary)
-        << with_values(in.model_text, {{"breast.young_modulus_kpa", found.carries_kpa}});
+    std::ofstream(run.output(target), std::ios::binary) << model_that_carries(in, found.carries_kpa);
     Json& f = run.figures(target);
     f["carries_kpa"] = found.carries_kpa;
     f["fails_kpa"] = found.fails_kpa ? Json(*found.fails_kpa) : Json(nullptr);
@@ -112,6 +111,16 @@ class SimulateTool : public Tool {
         found.fails_kpa ? fmt::format("{:.3g} does not", *found.fails_kpa) : std::string("nothing softer was tried"),
         found.chains, target.string()));
     return Outcome::done;
+  }
+
+  /// The model's text with the modulus that was found; where it is free, in a range that holds it.
+  static std::string model_that_carries(const CaseInputs& in, double kpa) {
+    const std::string name = "breast.young_modulus_kpa";
+    std::map<std::string, double> values = {{name, kpa}};
+    const simulation::Setting& setting = in.model.breast.young_modulus_kpa;
+    if (setting.free && kpa < setting.lower) values[name + ".lower"] = kpa / 2;
+    if (setting.free && kpa > setting.upper) values[name + ".upper"] = 2 * kpa;
+    return with_values(in.model_text, values);
   }
 
   fs::path folder() const { return output.empty() ? mesh_file_.parent_path() : output; }
@@ -125,9 +134,26 @@ class SimulateTool : public Tool {
       if (in.mesh.fraction.col(tissue).sum() == 0 || !fs::exists(file)) continue;
       auto surface = reconstruction::read_surface(run.input(file));
       simulation::Embedding embedding(in.mesh, surface.points);
+      check_lies_in_mesh(file, surface.points, embedding);
       found.push_back({name, std::move(surface), std::move(embedding)});
     }
     return found;
+  }
+
+  /// An organ of another body, or one that was moved since.
+  static void check_lies_in_mesh(const fs::path& file, const Points& points, const simulation::Embedding& places) {
+    constexpr double far_mm = 5, most_far = 0.1;
+    const auto far = (places.outside_mm().array() > far_mm).count();
+    if (static_cast<double>(far) <= most_far * static_cast<double>(points.rows())) return;
+    Eigen::Index worst = 0;
+    const double distance = places.outside_mm().maxCoeff(&worst);
+    throw InputError(fmt::format(
+        "{}: {:.0f} % of its points lie more than {:g} mm outside the imaged body (bound {:.0f} %), the farthest "
+        "{:.1f} mm "
+        "at ({:.1f}, {:.1f}, {:.1f}) mm. It belongs to another mesh: make it again with supine-reconstruct, or take it "
+        "away",
+        file.string(), 100.0 * static_cast<double>(far) / static_cast<double>(points.rows()), far_mm, 100 * most_far,
+        distance, points(worst, 0), points(worst, 1), points(worst, 2)));
   }
 
   void check_landmarks(Run& run, const CaseInputs& in, const Landmarks& landmarks,

@@ -14,6 +14,7 @@
 #include "pipeline/case/model_file.h"
 #include "pipeline/case/population_priors.h"
 #include "pipeline/results/targets_report.h"
+#include "pipeline/tool/lineage.h"
 #include "pipeline/work/diagnose.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/embedding.h"
@@ -86,9 +87,9 @@ class TargetsTool : public Tool {
     app.add_option("--points", points_,
                    "points in the image: .csv (name,x,y,z), .fcsv or .mrk.json of 3D Slicer (default: the landmarks of "
                    "the case and the middle of the tumour)")
-        ->expected(1);
+        ->allow_extra_args(false);
     app.add_option("--pose", poses_, "pose to find them in; may be repeated (default: every pose but the imaged one)")
-        ->expected(1);
+        ->allow_extra_args(false);
     app.add_option("--draws", draws_,
                    "hold the part of parameters and nuisances against that many draws through the whole chain")
         ->check(CLI::Range(2, 100000));
@@ -113,7 +114,10 @@ class TargetsTool : public Tool {
     if (!diagnosis_file_.empty() && !has_scan(description))
       throw InputError(fmt::format("--diagnosis {}: no pose of the case has a scan, so there is nothing it can be of",
                                    diagnosis_file_.string()));
-    if (!diagnosis_file_.empty()) told_ = read_likely_sets(run.input(diagnosis_file_));
+    if (!diagnosis_file_.empty()) {
+      told_ = read_likely_sets(run.input(diagnosis_file_));
+      check_is_of(description);
+    }
     for (const std::string& pose : wanted(description)) run.output(table(pose));
     return has_scan(description) ? by_scan(run) : by_priors(run, description);
   }
@@ -122,6 +126,17 @@ class TargetsTool : public Tool {
   fs::path folder() const { return output.empty() ? mesh_file_.parent_path() / "targets" : output; }
   fs::path table(const std::string& pose) const { return folder() / (pose + "_landmarks.csv"); }
   fs::path model() const { return model_file_.empty() ? case_folder_ / "model.toml" : model_file_; }
+
+  /// A diagnosis of another body says nothing of this one.
+  void check_is_of(const Case& description) const {
+    std::vector<fs::path> files = {mesh_file_};
+    for (const Pose& pose : description.poses)
+      if (pose.surface) files.push_back(*pose.surface);
+    for (const fs::path& file : files)
+      if (made_from_another(diagnosis_file_, file))
+        throw InputError(fmt::format("--diagnosis {}: was made from another {} than {}; diagnose this case again",
+                                     diagnosis_file_.string(), file.filename().string(), file.string()));
+  }
 
   std::vector<std::string> wanted(const Case& description) const {
     std::vector<std::string> names;

@@ -84,9 +84,9 @@ class WarpTool : public Tool {
     app.add_option("volumes", volumes_,
                    "volumes to carry, in the pose --from (default, without --points and --labels: the case's image, "
                    "labels.vti and prone landmarks)");
-    app.add_option("--labels", labels_, "volumes of labels: the nearest value is taken")->expected(1);
+    app.add_option("--labels", labels_, "volumes of labels: the nearest value is taken")->allow_extra_args(false);
     app.add_option("--points", points_, "points to carry: .csv (name,x,y,z), .fcsv or .mrk.json of 3D Slicer")
-        ->expected(1);
+        ->allow_extra_args(false);
     auto* pose = app.add_option("--pose", to_, "the same as --to");
     app.add_option("--from", from_,
                    "pose that the volumes show: prone, supine, undeformed, … (default: the imaged pose)");

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/error.h"
+
 namespace supine::pipeline {
 namespace {
 
@@ -49,6 +51,9 @@ Json error_of(const Case& measured, const Collected& collected) {
   for (const Row& row : {Row{"calibrated/" + file, "calibrated model"}, {file, "model as given"}}) {
     const Json& found = collected.find(row.file);
     if (found.is_null()) continue;
+    if (!(number(found, "rms_mm") >= 0))
+      throw InputError(fmt::format("{}: rms_mm is {}, and must be a number >= 0; compare again", row.file,
+                                   found.value("rms_mm", Json()).dump()));
     return {{"rms_mm", found.value("rms_mm", Json())},
             {"mae_mm", found.value("mae_mm", Json())},
             {"noise_mm", found.value("noise_mm", Json())},
@@ -157,6 +162,11 @@ void add_facts(const Json& diagnosis, const Collected& collected, const char* bo
   if (verdict != "missing" && verdict != "ambiguous")
     for (const Json& far : diagnosis.value("unexpected", Json::array()))
       answer.facts.push_back("Otherwise than expected, " + far.value("in_words", "?") + ".");
+  if (const double triangles = number(diagnosis, "finer_triangles"); triangles > 0)
+    answer.facts.push_back(fmt::format(
+        "The mesh errs by {:.1f} mm, more than the scan or anything else: a finer one (TRIANGLES={:.0f}) may "
+        "show more.",
+        number(diagnosis.value("budget_mm", Json::object()), "numerical"), triangles));
   Json blind = Json::array();
   for (const Json& effect : diagnosis.value("cannot_see", Json::array())) blind.push_back(effect.value("effect", "?"));
   if (!blind.empty()) answer.facts.push_back("This scan could not show: " + listed(blind, "and") + ".");
@@ -171,6 +181,18 @@ void add_facts(const Json& diagnosis, const Collected& collected, const char* bo
 
 }  // namespace
 
+namespace {
+
+/// What a person has to know before the sentence: that it may be of something else. Empty where all belongs together.
+std::string out_of_date(const std::vector<Stage>& stages, std::initializer_list<std::string_view> names) {
+  for (const Stage& stage : stages)
+    if (!stage.stale.empty() && std::find(names.begin(), names.end(), stage.name) != names.end())
+      return fmt::format("Out of date, {}: ", stage.stale);
+  return {};
+}
+
+}  // namespace
+
 Answer answer_of(const Case& measured, const Collected& collected, const std::vector<Stage>& stages,
                  const Places& places) {
   Answer answer;
@@ -180,6 +202,11 @@ Answer answer_of(const Case& measured, const Collected& collected, const std::ve
     const char* body = measured.is_object() ? "body" : "breast";
     tell_diagnosis(diagnosis, places, body, answer);
     add_facts(diagnosis, collected, body, answer);
+    if (const std::string stale = out_of_date(stages, {"mesh", "diagnose"}); !stale.empty()) {
+      answer.sentence = stale + answer.sentence;
+      answer.next = "Diagnose again.";
+      answer.command = places.make("diagnose");
+    }
     return answer;
   }
   const bool has_scan = std::any_of(measured.poses.begin(), measured.poses.end(),
@@ -209,6 +236,7 @@ Answer answer_of(const Case& measured, const Collected& collected, const std::ve
                                 "The {} lies {:.2f} mm RMS from the measured surface; what it lacks has not "
                                 "been asked yet.",
                                 answer.error["of"].get<std::string>(), number(answer.error, "rms_mm"));
+    answer.sentence = out_of_date(stages, {"mesh", "simulate", "compare"}) + answer.sentence;
     answer.next = "Ask what is missing.";
     answer.command = places.make("diagnose");
   }

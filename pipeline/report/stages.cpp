@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 
+#include "pipeline/case/shape_gravity.h"
 #include "pipeline/tool/hash.h"
 
 namespace supine::pipeline {
@@ -85,23 +86,49 @@ std::string command_of(const Json& figures, const Places& places, const std::str
   return line + output_of(tool, folder);
 }
 
-/// Names a file that is another one now than when @p figures were made of it. Only files of our own folders, whose
-/// names are theirs alone, are looked at.
-std::string stale(const std::string& sidecar, const Json& figures, const Places& places) {
+/// Scans and landmarks that the case names.
+std::vector<fs::path> measurements(const Case& measured) {
+  std::vector<fs::path> files;
+  for (const Pose& pose : measured.poses) {
+    if (pose.surface) files.push_back(*pose.surface);
+    if (pose.landmarks) files.push_back(*pose.landmarks);
+  }
+  if (measured.prone_landmarks) files.push_back(*measured.prone_landmarks);
+  return files;
+}
+
+/// Where a file may lie that goes by this name in the provenance of @p tool: in folders of our own, whose names are
+/// theirs alone, or as a measurement of the case.
+std::vector<fs::path> places_of(const std::string& name, const std::string& tool, const std::string& sidecar,
+                                const Case& measured, const Places& places) {
+  std::vector<fs::path> found;
+  // A diagnosis reads two of this name: the calibrated one, and the case's own for its priors.
+  if (name == "model.toml")
+    found = {places.case_folder / name, (lies_in_case(name, tool) ? places.case_folder : places.out) / name};
+  else if (const std::string end = fs::path(name).extension().string();
+           end == ".vtu" || end == ".vtp" || end == ".vti") {
+    const fs::path beside = places.out / fs::path(sidecar).parent_path() / name;
+    found = {fs::exists(beside) ? beside : places.out / name};
+  }
+  for (const fs::path& file : measurements(measured))
+    if (file.filename() == name) found.push_back(file);
+  return found;
+}
+
+/// Names a file that is another one now than when @p figures were made of it.
+std::string stale(const std::string& sidecar, const Json& figures, const Case& measured, const Places& places) {
   const Json made = figures.value("provenance", Json::object());
   for (const Json& input : made.value("inputs", Json::array())) {
-    const std::string name = input.value("file", ""), end = fs::path(name).extension().string();
-    if (end != ".vtu" && end != ".vtp" && end != ".vti" && name != "model.toml") continue;
-    const fs::path beside = places.out / fs::path(sidecar).parent_path() / name;
-    fs::path there = fs::exists(beside) ? beside : places.out / name;
-    if (name == "model.toml")
-      there = (lies_in_case(name, made.value("tool", "")) ? places.case_folder : places.out) / name;
-    // A diagnosis reads two of this name: the calibrated one, and the case's own for its priors.
-    const fs::path given = places.case_folder / "model.toml";
-    const std::string hash = input.value("sha256", "");
-    if (name == "model.toml" && fs::exists(given) && sha256(given) == hash) continue;
-    if (fs::exists(there) && sha256(there) != hash) return fmt::format("{} was made from another {}", sidecar, name);
+    const std::string name = input.value("file", ""), hash = input.value("sha256", "");
+    auto files = places_of(name, made.value("tool", ""), sidecar, measured, places);
+    std::erase_if(files, [](const fs::path& file) { return !fs::exists(file); });
+    const auto same = [&hash](const fs::path& file) { return sha256(file) == hash; };
+    if (!files.empty() && std::none_of(files.begin(), files.end(), same))
+      return fmt::format("{} was made from another {}", sidecar, name);
   }
+  for (const Pose& pose : measured.poses)
+    if (sidecar == pose.name + ".json" && is_of_other_gravity(figures, pose))
+      return fmt::format("{} was computed with another gravity than [pose.{}] of case.toml has", sidecar, pose.name);
   return {};
 }
 
@@ -140,7 +167,7 @@ std::vector<Stage> stages_of(const Case& measured, const Collected& collected, c
       const fs::path folder = fs::path(places.out_name) / fs::path(stage.file).parent_path();
       stage.command =
           command_of(figures, places, (folder / "").parent_path().generic_string(), measured.image_kind == "surface");
-      stage.stale = stale(stage.file, figures, places);
+      stage.stale = stale(stage.file, figures, measured, places);
     } else if (row.needs_scan && !has_scan(measured)) {
       stage.fill =
           fmt::format("a measured surface: name it as `surface` in [pose.{}] of case.toml", measured.predicted().name);

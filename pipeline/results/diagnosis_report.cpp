@@ -249,6 +249,7 @@ diagnosis::Subject subject_of(const MeasuredCase& measured, const simulation::Mo
 
 DiagnosisResult complete(const MeasuredCase& measured, std::unique_ptr<Findings> found) {
   DiagnosisResult result{std::move(found), {}, {}};
+  if (diagnosis::mesh_errs_most(result.found->budget)) result.finer_triangles = 2 * measured.mesh.faces.rows();
   const Findings& f = *result.found;
   const auto areas = calibration::anatomical_areas(measured.mesh, measured.anatomy);
   const auto measurements = measured.whole_scene().measurements;
@@ -314,6 +315,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   for (const auto& far : diagnosis::far_nuisances(found.base.nuisances))
     f["unexpected"].push_back({{"name", far.name}, {"in_words", far.in_words}, {"sigma", far.sigma}});
   f["budget_mm"] = budget_json(found.budget);
+  f["finer_triangles"] = result.finer_triangles > 0 ? Json(result.finer_triangles) : Json(nullptr);
   f["hot_spots"] = Json::array();
   for (const auto& spot : result.hot_spots)
     f["hot_spots"].push_back({{"area", spot.area},

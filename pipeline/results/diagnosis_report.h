@@ -16,6 +16,8 @@ struct DiagnosisResult {
   std::unique_ptr<diagnosis::Findings> found;
   std::vector<diagnosis::HotSpot> hot_spots;
   std::vector<diagnosis::Separation> next;
+  /// Triangles of a surface whose mesh errs less, where the mesh errs by more than anything else does; 0 where not.
+  Eigen::Index finer_triangles = 0;
 };
 
 /// @param given  the base model: where priors stand

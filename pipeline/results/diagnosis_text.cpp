@@ -194,6 +194,11 @@ void say_limits(const Run& run, const DiagnosisResult& result) {
     if (!best.shows.empty()) text += fmt::format("; shows {} best of what cannot be seen now", best.shows);
     run.say(text);
   }
+  if (result.finer_triangles > 0)
+    run.say(fmt::format(
+        "  finer mesh: this one errs by {:.1f} mm, more than the scan or anything else; make CASE=... TRIANGLES={} "
+        "diagnose takes several times as long and may show more",
+        found.budget.numerical, result.finer_triangles));
   if (found.diagnosis.verdict == Verdict::missing)
     run.say(fmt::format("  add it:   supine-model add {} model.toml && make CASE=... calibrate", set[0]));
 }

@@ -119,6 +119,10 @@ const fs::path& Run::input(const fs::path& file) {
 
 fs::path Run::output(const fs::path& target) {
   if (const auto known = state_->temporaries.find(target); known != state_->temporaries.end()) return known->second;
+  std::error_code unresolved;
+  if (state_->input_paths.contains(fs::weakly_canonical(target, unresolved)))
+    throw InputError(fmt::format("{} is read here, and would be replaced by what is made of it; name another output",
+                                 target.string()));
   if (target.extension() == ".json") return state_->sidecar_of(target).temporary;
   const fs::path temporary = state_->outputs.stage(target);
   state_->temporaries.emplace(target, temporary);

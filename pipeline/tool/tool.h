@@ -37,6 +37,7 @@ class Run {
   const std::filesystem::path& input(const std::filesystem::path& file);
 
   /// The temporary path to write the output @p target to; see Outputs::stage.
+  /// @throws InputError  an input of this run
   std::filesystem::path output(const std::filesystem::path& target);
 
   /// The same for a file that has no sidecar of its own: a .json in the format of another program.

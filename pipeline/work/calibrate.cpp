@@ -34,9 +34,14 @@ Fit skin_of(Fit fit) {
 }
 
 /// The scan's place as six more unknowns, with the catalogue's priors.
+/// @throws InputError  the model says where the scan lies
 void add_scan_offset(simulation::Model& model) {
   for (const auto& effect : model.effects)
-    if (simulation::traits_of(effect.name).moves_scan) return;
+    if (simulation::traits_of(effect.name).moves_scan)
+      throw InputError(
+          fmt::format("--scan-offset: the model has the effect {} already; free its numbers there and leave "
+                      "the option out, or remove the effect",
+                      effect.name));
   const simulation::Effect& effect = simulation::place_of_scan();
   simulation::EffectSetting setting = simulation::null_setting(effect);
   for (const simulation::Parameter& row : effect.parameters())

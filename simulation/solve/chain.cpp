@@ -3,6 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
 #include "common/error.h"
 #include "simulation/model_fields.h"
 #include "simulation/solve/folds.h"
@@ -18,30 +22,40 @@ constexpr double correction_tolerance_mm = 1e-3;  // of the fixed point: far und
 constexpr double second_shape_bound_mm = 1e-3;    // two balanced shapes this close are one
 constexpr double kg_mm3_per_kg_m3 = 1e-9;
 
+/// Of gravity from the chest's front or back, prone and supine: breasts face up to some 45 degrees to the side.
+constexpr double widest_deg = 75;
+
+double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
+}
+
 void check_imaged_pose(const PoseLoad& prone, const meshing::Anatomy& anatomy) {
   if (prone.name != anatomy.imaged_pose)
     throw InputError(fmt::format("the body was imaged in pose '{}', and the chain starts from '{}'",
                                  anatomy.imaged_pose, prone.name));
   if (prone.name != "prone" || anatomy.is_object()) return;
-  const double along = prone.gravity.dot(anatomy.outward);
-  if (along > 0) return;
+  const double angle = degrees_between(prone.gravity, anatomy.outward);
+  if (angle < widest_deg) return;
   const Eigen::Vector3d& n = anatomy.outward;
   throw InputError(fmt::format(
-      "pose.prone.gravity = [{:.3f}, {:.3f}, {:.3f}] presses the breast into the muscle, whose outward normal is "
-      "({:.3f}, {:.3f}, {:.3f}): the angle must be under 90 degrees. A prone breast hangs away from the chest: check "
-      "the sign, or case.frame against the frame of the image",
-      prone.gravity.x(), prone.gravity.y(), prone.gravity.z(), n.x(), n.y(), n.z()));
+      "pose.prone.gravity = [{:.3f}, {:.3f}, {:.3f}] {} the muscle, whose outward normal is ({:.3f}, {:.3f}, {:.3f}): "
+      "the angle between them is {:.0f} degrees and must be under {:.0f}. A prone breast hangs away from the chest: "
+      "check sign and order of the numbers, or case.frame against the frame of the image",
+      prone.gravity.x(), prone.gravity.y(), prone.gravity.z(), angle > 90 ? "presses the breast into" : "runs along",
+      n.x(), n.y(), n.z(), angle, widest_deg));
 }
 
 void check_supine_gravity(const PoseLoad& pose, const meshing::Anatomy& anatomy) {
-  const double along = pose.gravity.dot(anatomy.outward);
-  if (pose.name != "supine" || anatomy.is_object() || along <= 0) return;
+  if (pose.name != "supine" || anatomy.is_object()) return;
+  const double angle = degrees_between(pose.gravity, -anatomy.outward);
+  if (angle < widest_deg) return;
   const Eigen::Vector3d& n = anatomy.outward;
   throw InputError(fmt::format(
-      "pose.supine.gravity = [{:.3f}, {:.3f}, {:.3f}] pulls the breast off the muscle, whose outward normal is "
-      "({:.3f}, "
-      "{:.3f}, {:.3f}): the angle must be over 90 degrees. On the back the breast lies on the chest: check the sign",
-      pose.gravity.x(), pose.gravity.y(), pose.gravity.z(), n.x(), n.y(), n.z()));
+      "pose.supine.gravity = [{:.3f}, {:.3f}, {:.3f}] {} the muscle, whose outward normal is ({:.3f}, {:.3f}, {:.3f}): "
+      "the angle between them is {:.0f} degrees and must be over {:.0f}. On the back the breast lies on the chest: "
+      "check sign and order of the numbers",
+      pose.gravity.x(), pose.gravity.y(), pose.gravity.z(), angle > 90 ? "pulls the breast off" : "runs along", n.x(),
+      n.y(), n.z(), 180 - angle, 180 - widest_deg));
 }
 
 /// Notes smallest det F at the quadrature points and the cells folded in @p x or @p X.

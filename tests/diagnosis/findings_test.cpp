@@ -54,5 +54,16 @@ TEST(Findings, RefitsAreFoundByTheirEffectsInAnyOrderWhereTheyWereSolved) {
   EXPECT_EQ(found.refit_of({"friction"}), nullptr);
 }
 
+TEST(Budget, AFinerMeshIsAskedForWhereTheMeshErrsMost) {
+  ErrorBudget large{.noise = 0.73, .registration = 0.74, .numerical = 1.36, .parameters = 0.8, .patchiness = 1.01};
+  EXPECT_TRUE(mesh_errs_most(large));
+  for (double ErrorBudget::*other : {&ErrorBudget::noise, &ErrorBudget::registration, &ErrorBudget::parameters,
+                                     &ErrorBudget::patchiness, &ErrorBudget::model_form}) {
+    ErrorBudget usual = large;
+    usual.*other = 1.4;
+    EXPECT_FALSE(mesh_errs_most(usual));
+  }
+}
+
 }  // namespace
 }  // namespace supine::diagnosis

@@ -44,7 +44,7 @@ TEST(OtherMesh, OfCurvedCellsIsCurvedOntoTheirFaces) {
                                               2;
   const double missed = curved - volume_mm3(flat);
   ASSERT_GT(missed, 1e-3 * curved);
-  for (const TetMesh& other : {other_mesh(mesh, anatomy, 0.5), coarser_mesh(mesh, anatomy, 0.8)}) {
+  for (const TetMesh& other : {other_mesh(mesh, 0.5), coarser_mesh(mesh, anatomy, 0.8)}) {
     EXPECT_EQ(other.order(), 2);
     EXPECT_LT(std::abs(volume_mm3(other) - curved), missed / 4);
   }
@@ -53,7 +53,7 @@ TEST(OtherMesh, OfCurvedCellsIsCurvedOntoTheirFaces) {
 TEST(OtherMesh, IsFinerAtTheSkinsEndThanTheMeshIsThere) {
   TetMesh mesh = testing::dome_mesh({.rings = 6, .layers = 2});
   for (int twice = 0; twice < 2; ++twice) {
-    const TetMesh finer = other_mesh(mesh, meshing::compute_anatomy(mesh, "left"), 0.5);
+    const TetMesh finer = other_mesh(mesh, 0.5);
     EXPECT_LT(skin_edge_of(finer), 0.7 * skin_edge_of(mesh)) << twice;
     EXPECT_NEAR(volume_mm3(finer) / volume_mm3(mesh), 1, 1e-3);
     mesh = finer;
@@ -89,7 +89,7 @@ TEST(OtherMesh, HoldsAsMuchOfATissueWhereItIs) {
   put_gland(mesh, middle, 0.3 * size_mm);
   const double gland = gland_mm3(mesh);
   const meshing::Anatomy anatomy = meshing::compute_anatomy(mesh, "left");
-  for (const TetMesh& other : {other_mesh(mesh, anatomy, 0.5), coarser_mesh(mesh, anatomy, 0.5)}) {
+  for (const TetMesh& other : {other_mesh(mesh, 0.5), coarser_mesh(mesh, anatomy, 0.5)}) {
     EXPECT_NEAR(gland_mm3(other) / gland, 1, 0.03);
     for (Eigen::Index c = 0; c < other.cells.rows(); ++c) {
       EXPECT_NEAR(other.fraction.row(c).sum(), 1, 1e-12);

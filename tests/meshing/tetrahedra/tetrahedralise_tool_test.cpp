@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <Eigen/LU>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -30,21 +31,37 @@ class TetrahedraliseTool : public ::testing::Test {
     const auto dome = testing::dome_mesh({.rings = 7, .layers = 2});
     reconstruction::write_surface(testing::boundary_surface(dome), folder_ / "coarse.vtp");
     reconstruction::write_surface(dome.muscle, folder_ / "muscle.vtp");
-    segmentation::write_labels(labels_around(dome.points), folder_ / "labels.vti", {{"side", "right"}});
+    segmentation::write_labels(labels_of(dome), folder_ / "labels.vti", {{"side", "right"}});
   }
   void TearDown() override { fs::remove_all(folder_); }
 
   static fs::path tool() { return fs::path(SUPINE_BIN_DIR) / "supine-tetrahedralise"; }
 
-  // Adipose everywhere: the surface alone says what is inside.
-  static segmentation::LabelImage labels_around(const Points& points) {
+  // Adipose in every voxel whose middle lies in a cell.
+  static segmentation::LabelImage labels_of(const meshing::TetMesh& mesh) {
+    const Points& points = mesh.points;
     segmentation::LabelImage image;
     image.grid.spacing_mm.setConstant(3);
     image.grid.origin_mm = points.colwise().minCoeff().transpose().array() - 6;
     image.grid.size =
         ((points.colwise().maxCoeff() - points.colwise().minCoeff()).array() / 3 + 6).cast<int>().transpose();
-    image.voxels.assign(image.grid.count(), static_cast<std::uint8_t>(segmentation::Tissue::adipose));
+    image.voxels.assign(image.grid.count(), static_cast<std::uint8_t>(segmentation::Tissue::air));
+    for (Eigen::Index c = 0; c < mesh.cells.rows(); ++c) paint(points(mesh.cells.row(c).head(4), Eigen::all), image);
     return image;
+  }
+
+  static void paint(const Eigen::Matrix<double, 4, 3>& corners, segmentation::LabelImage& image) {
+    Eigen::Matrix4d from;
+    from << corners.transpose(), Eigen::RowVector4d::Ones();
+    const Eigen::Matrix4d barycentric = from.inverse();
+    const segmentation::Grid& grid = image.grid;
+    const Eigen::Vector3i low = grid.continuous_index(corners.colwise().minCoeff().transpose()).cast<int>(),
+                          high = grid.continuous_index(corners.colwise().maxCoeff().transpose()).cast<int>();
+    for (int k = low.z(); k <= high.z() + 1; ++k)
+      for (int j = low.y(); j <= high.y() + 1; ++j)
+        for (int i = low.x(); i <= high.x() + 1; ++i)
+          if ((barycentric * grid.point(Eigen::Vector3d(i, j, k)).homogeneous()).minCoeff() >= 0)
+            image.voxels[grid.index(i, j, k)] = static_cast<std::uint8_t>(segmentation::Tissue::adipose);
   }
 
   int run(const std::string& arguments) const {

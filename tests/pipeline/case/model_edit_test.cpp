@@ -122,6 +122,23 @@ TEST_F(ModelEdit, AFixedNumberIsReplacedToo) {
             "# my notes\n[breast]\nyoung_modulus_kpa = 0.25  # from the clinic\n");
 }
 
+TEST_F(ModelEdit, ABoundIsReplacedWhereItStandsInTheFile) {
+  const auto path = file("[breast]\nyoung_modulus_kpa = { value = 2, lower = 0.1, upper = 20 }\n");
+  EXPECT_EQ(with_values(read_model_text(path),
+                        {{"breast.young_modulus_kpa", 0.05}, {"breast.young_modulus_kpa.lower", 0.025}}),
+            "[breast]\nyoung_modulus_kpa = { value = 0.05, lower = 0.025, upper = 20 }\n");
+  EXPECT_THROW(with_values(read_model_text(file(base)), {{"breast.young_modulus_kpa.lower", 1}}), InputError);
+}
+
+TEST_F(ModelEdit, EffectsInOneListAreReadAndNotEdited) {
+  const auto path = file("effect = [ { name = \"ligament\" }, { name = \"friction\" } ]\n" + base);
+  EXPECT_EQ(read_model(path).effects.size(), 2u);
+  for (const char* effect : {"ligament", "creep"}) {
+    expect_words(input_error([&] { without_effect(read_model_text(path), effect); }), {"model.toml:1", "[[effect]]"});
+    expect_words(input_error([&] { with_effect(read_model_text(path), effect); }), {"model.toml:1", "[[effect]]"});
+  }
+}
+
 TEST_F(ModelEdit, NewValuesAreForNumbersThatStandInTheFile) {
   EXPECT_THROW(with_values(read_model_text(file(base)), {{"skin.young_modulus_kpa", 1}}), InputError);
   EXPECT_THROW(with_values(read_model_text(file(base)), {{"ligament.stiffness_kpa_per_mm", 1}}), InputError);

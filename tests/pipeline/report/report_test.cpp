@@ -220,6 +220,27 @@ TEST(ReportStages, AnInputThatWasWrittenAgainMakesItsResultStale) {
   expect_words(stage(stages_of(measured_case(), collected, here), "simulate").stale, {"supine.json", "mesh.vtu"});
 }
 
+TEST(ReportStages, AScanThatWasMovedSinceAndAnotherGravityMakeStaleToo) {
+  const TemporaryFolder folder;
+  write_text(folder / "supine.ply", "abcd");
+  const std::string hash = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";  // of "abc", FIPS 180-2
+  Case measured = measured_case();
+  measured.poses[1].surface = folder / "supine.ply";
+  Collected collected;
+  collected.figures["diagnosis.json"] = {
+      {"verdict", "nothing_missing"}, {"missing", Json::array()}, {"why", "it fits"}};
+  collected.figures["diagnosis.json"]["provenance"] = {{"tool", "supine-diagnose"},
+                                                       {"inputs", {{{"file", "supine.ply"}, {"sha256", hash}}}}};
+  collected.figures["supine.json"]["gravity"] = {0, 0.8, 0.6};
+  const Places here = {folder.path(), folder / "out", "c", "c/out"};
+  const auto stages = stages_of(measured, collected, here);
+  expect_words(stage(stages, "diagnose").stale, {"diagnosis.json", "another supine.ply"});
+  expect_words(stage(stages, "simulate").stale, {"supine.json", "another gravity", "[pose.supine]"});
+  const Answer answer = answer_of(measured, collected, stages, here);
+  expect_words(answer.sentence, {"Out of date", "another supine.ply", "Nothing is missing"});
+  EXPECT_EQ(answer.command, "make CASE=c diagnose");
+}
+
 Answer answered(const Json& diagnosis) {
   Collected collected;
   collected.figures["supine.json"] = Json::object();
@@ -276,6 +297,24 @@ TEST(ReportAnswer, BeforeTheDiagnosisItSaysWhatToRun) {
   Case no_scan = measured_case();
   no_scan.poses[1].surface.reset();
   EXPECT_EQ(answer_of(no_scan, {}, stages_of(no_scan, {}, places), places).kind, "no_shape");
+}
+
+TEST(ReportAnswer, AnErrorThatIsNoNumberIsRefused) {
+  for (const Json& wrong : {Json(nullptr), Json(-1.5), Json("1")}) {
+    Collected collected;
+    collected.figures["comparison.json"] = {{"rms_mm", wrong}};
+    expect_words(input_error([&] { answer_of(measured_case(), collected, {}, places); }),
+                 {"comparison.json", "rms_mm"});
+  }
+}
+
+TEST(ReportAnswer, SaysWhereAFinerMeshWouldShowMost) {
+  const Answer answer = answered({{"verdict", "nothing_missing"},
+                                  {"missing", Json::array()},
+                                  {"finer_triangles", 1876},
+                                  {"budget_mm", {{"numerical", 1.36}}}});
+  ASSERT_FALSE(answer.facts.empty());
+  expect_words(answer.facts.front(), {"mesh errs by 1.4 mm", "TRIANGLES=1876"});
 }
 
 TEST(ReportCollect, DropsTimingAndRefusesWhatIsNoJson) {
