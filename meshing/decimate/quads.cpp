@@ -82,6 +82,12 @@ DecimateResult decimate_to_quads(const DecimateMeasure& measure, const DecimateO
                                 places.empty() ? fmt::format("distance {:.2f} mm", result.distance_mm)
                                                : std::string("quads cross each other or turn over"),
                                 first.x(), first.y(), first.z());
+    // Attempts become dearer with their triangles, and more than the surface has are of no use.
+    if (result.surface.triangles.rows() > in.triangles.rows()) {
+      failed.reason += fmt::format(", with {} triangles of {} that the surface has", result.surface.triangles.rows(),
+                                   in.triangles.rows());
+      return failed;
+    }
     places.insert(places.end(), far.begin(), far.end());
     const std::vector<Eigen::Vector3d> spread = thinned(places, edge_mm);
     const double cells = measure.report().area_mm2 / (edge_mm * edge_mm);

@@ -102,8 +102,11 @@ toml::source_region value_place(const toml::table& table, const fs::path& file, 
   const auto dot = name.find('.'), second = name.find('.', dot + 1);
   const toml::table* section = section_of(table, name.substr(0, dot));
   const toml::node* value = section ? section->get(name.substr(dot + 1, second - dot - 1)) : nullptr;
+  const bool bound = second != std::string::npos;
   if (value != nullptr && value->is_table())
-    value = value->as_table()->get(second == std::string::npos ? "value" : name.substr(second + 1));
+    value = value->as_table()->get(bound ? name.substr(second + 1) : "value");
+  else if (bound)
+    value = nullptr;
   if (value == nullptr || !value->is_number())
     throw InputError(fmt::format("{} holds no number {}, so it cannot be replaced; write one", file.string(), name));
   return value->source();

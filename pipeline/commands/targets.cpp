@@ -268,6 +268,8 @@ class TargetsTool : public Tool {
     Targets all;
     std::string from = "the case";
     for (const fs::path& file : points_) {
+      if (std::count(points_.begin(), points_.end(), file) > 1)
+        throw InputError(fmt::format("--points {}: is given twice", file.string()));
       const warp::PointFile points(run.input(file), description.frame);
       for (std::size_t p = 0; p < points.names().size(); ++p)
         all.add(points.names()[p], points.points().row(static_cast<Eigen::Index>(p)));

@@ -88,6 +88,11 @@ TEST_F(NullTwin, TheBudgetHoldsTheNoiseAndWhatIsUnexplained) {
   EXPECT_NEAR(found->budget.noise, noise_mm, 0.05);
   EXPECT_NEAR(found->budget.total, found->rms_mm, 1e-12);
   EXPECT_EQ(found->budget.model_form, found->unexplained.mean_mm);
+  // What places and moduli leave to doubt once this scan is fitted: less than it errs, more than nothing.
+  for (const double doubt : {found->budget.registration, found->budget.parameters}) {
+    EXPECT_GT(doubt, 0.005);
+    EXPECT_LT(doubt, noise_mm);
+  }
 }
 
 TEST_F(NullTwin, AScanThatLiesElsewhereIsFoundThere) {
@@ -135,6 +140,22 @@ TEST_F(NullTwin, AFurtherPoseSeparatesMoreThanTheSameAgain) {
     if (s.measurement.find("once more") != std::string::npos) again = s.separation;
   }
   EXPECT_GT(next.front().separation, again);
+}
+
+TEST_F(NullTwin, TheSameOnceMoreShowsNoLessThanOnce) {
+  const std::vector<std::string> unseen = not_seen(*found);
+  double power = 0, weights = 0;
+  for (const Score& score : found->table.scores) {
+    if (std::find(unseen.begin(), unseen.end(), score.effect) == unseen.end()) continue;
+    const double weight = found->priors.of_effect(found->effects(), score.effect);
+    power += weight * score.power;
+    weights += weight;
+  }
+  ASSERT_GT(weights, 0);
+  for (const Separation& s : next_measurements(subject_of(*twin), *found, {})) {
+    if (s.measurement.find("once more") == std::string::npos) continue;
+    EXPECT_GE(s.single_power, 0.95 * power / weights);
+  }
 }
 
 TEST_F(NullTwin, TheLessIsKnownOfWhereAScanLiesTheLessAFurtherOneSeparates) {

@@ -51,7 +51,7 @@ class CaseFile : public testing::Test {
  protected:
   CaseFile() {
     for (const char* name : {"labels.nrrd", "supine.ply", "supine_landmarks.csv", "prone_landmarks.csv"})
-      write_text(folder_ / name, "x");
+      write_text(folder_ / name, name);
   }
   Case read(const std::string& text) {
     write_text(folder_ / "case.toml", text);
