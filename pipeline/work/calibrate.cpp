@@ -71,7 +71,10 @@ class Calibration {
                                             : calibration::fit_least_squares(evaluator, parameters_, options);
     run_.stage("worth");
     result.uncertainty = calibration::judge(skin_of(result.fit), parameters_, options.use_priors);
-    if (asked_.method == "joint") result.uncertainty.covariance = posterior;
+    result.used_priors = options.use_priors;
+    result.likelihoods =
+        calibration::likelihoods(skin_of(result.fit), parameters_, result.uncertainty, options.use_priors);
+    if (asked_.method == "joint") take_posterior(posterior, result);
     result.interval_kind = asked_.method == "joint" ? "posterior" : asked_.intervals;
     if (asked_.method == "cmaes") result.interval_kind = "linear";  // another optimum than that of the profiled cost
     result.intervals = calibration::linear_intervals(result.fit, parameters_, result.uncertainty);
@@ -136,6 +139,16 @@ class Calibration {
     result.fit.converged = true;
     result.fit.message = "joint fit with all that is never known";
     return posterior.of_parameters;
+  }
+
+  void take_posterior(const Eigen::MatrixXd& covariance, CalibrationResult& result) const {
+    result.uncertainty.covariance = covariance;
+    for (Eigen::Index i = 0; i < parameters_.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const auto& prior = parameters_.priors()[k];
+      result.likelihoods[k] = likelihood_of({result.fit.u[i], std::sqrt(covariance(i, i))},
+                                            prior ? std::optional<Likelihood>({prior->mean, prior->sd}) : std::nullopt);
+    }
   }
 
   Fit search_cmaes(Evaluator& evaluator, const calibration::FitOptions& fit_options) {
