@@ -200,6 +200,7 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const FitOp
   fit.residuals = state.residuals;
   fit.linearisation = state.linearisation;
   fit.own_information = state.own_information;
+  fit.information = state.information;
   fit.cost = state.cost;
 }
 

@@ -171,8 +171,8 @@ class Minimisation {
 }  // namespace
 
 void CmaesOptions::check() const {
-  if (population != 0 && population < 5)
-    throw InputError(fmt::format("population = {}: must be 0 or >= 5", population));
+  if (population != 0 && population < least_population)
+    throw InputError(fmt::format("population = {}: must be 0 or at least {}", population, least_population));
   if (max_evaluations < 1) throw InputError(fmt::format("max_evaluations = {}: must be > 0", max_evaluations));
   if (until_mae_mm && !(*until_mae_mm > 0)) throw InputError(fmt::format("until_mae = {}: must be > 0", *until_mae_mm));
 }

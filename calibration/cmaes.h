@@ -10,10 +10,13 @@
 
 namespace supine::calibration {
 
+/// Runs of a generation, pagmo's bound.
+inline constexpr int least_population = 5;
+
 struct CmaesOptions {
   unsigned seed = 1;
-  int population = 0;                  ///< runs per generation, at least 5; 0 = 4 + 3 ln n, at least 6
-  int max_evaluations = 300;           ///< > 0
+  int population = 0;         ///< runs per generation, at least least_population; 0 = the larger of 6 and 4 + 3 ln n
+  int max_evaluations = 300;  ///< > 0
   std::optional<double> until_mae_mm;  ///< stop as soon as a generation holds a run at or under it
   double flat_mm = 1e-3;  ///< stop when three generations have spread by less and the best has not improved by more
   std::function<void(int evaluations, int failed, double best_mae_mm)> progress;  ///< may be empty

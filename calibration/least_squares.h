@@ -48,6 +48,7 @@ struct Fit {
   Residuals residuals;
   Linearisation linearisation;
   Eigen::MatrixXd own_information;  ///< JᵀJ of FitOptions::own; empty where there is none
+  Eigen::MatrixXd information;      ///< JᵀJ of all that the cost holds, priors too; empty where nothing was minimised
   double cost = 0;  ///< half the sum of squares of the weighted, robust residuals, own ones and the priors
   bool converged = false;
   std::string message;

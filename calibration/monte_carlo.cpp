@@ -70,6 +70,8 @@ Eigen::VectorXd first_order_shares(const Eigen::MatrixXd& values, const Eigen::V
   const Eigen::Index n = values.rows();
   const auto classes = std::max<Eigen::Index>(2, static_cast<Eigen::Index>(std::sqrt(static_cast<double>(n))));
   const double mean = result.mean(), total = (result.array() - mean).square().sum();
+  if (!(total > 0)) return Eigen::VectorXd::Zero(values.cols());
+  if (values.cols() == 1) return Eigen::VectorXd::Ones(1);
   Eigen::VectorXd shares(values.cols());
   std::vector<Eigen::Index> order(static_cast<std::size_t>(n));
   for (Eigen::Index p = 0; p < values.cols(); ++p) {

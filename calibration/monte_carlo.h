@@ -26,7 +26,7 @@ Draws draw_parameters(const FreeParameters& parameters, DrawKind kind, int count
 
 /// First-order share of each parameter in the variance of @p result (Sobol), from the sample itself: variance of the
 /// means over classes of equal size (about √n of them) of one parameter, less what chance alone gives them.
-/// What is left to 1 is interaction.
+/// What is left to 1 is interaction. One parameter alone has all of it; a result that does not vary gives 0.
 /// @param values  #n by #parameters, drawn independently of each other
 Eigen::VectorXd first_order_shares(const Eigen::MatrixXd& values, const Eigen::VectorXd& result);
 

@@ -2,6 +2,7 @@
 #include "calibration/uncertainty.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "common/rms.h"
@@ -27,6 +28,31 @@ struct Closed {
   Eigen::MatrixXd sandwich(const Eigen::MatrixXd& spread) const { return inverse * (spread + added) * inverse; }
 };
 
+Uncertainty::Information points_information(const Fit& fit, const ErrorModel& errors) {
+  const Eigen::MatrixXd& j = fit.linearisation.slope;
+  const double precision = 1 / mean_square(fit.residuals.distance_mm);
+  return {precision * (j.transpose() * j), precision * precision * weighted_product(errors, fit.residuals, j, j)};
+}
+
+/// Of priors and of a user's own residuals, which are normal about what was measured, as priors are.
+Eigen::MatrixXd prior_matrix(const Fit& fit, const FreeParameters& parameters, bool use_priors) {
+  Eigen::MatrixXd priors = Eigen::MatrixXd::Zero(parameters.size(), parameters.size());
+  if (use_priors) priors.diagonal() = parameters.prior_information();
+  if (fit.own_information.size() > 0) priors += fit.own_information;
+  return priors;
+}
+
+/// How far coordinate i goes when its prior no longer holds it.
+double without_prior(const Fit& fit, const FreeParameters& parameters, Eigen::Index i) {
+  const auto& prior = parameters.priors()[static_cast<std::size_t>(i)];
+  if (!prior || fit.information.size() == 0) return fit.u[i];
+  const double weight = 1 / (prior->sd * prior->sd);
+  Eigen::MatrixXd others = fit.information;
+  others(i, i) -= weight;
+  const double to = fit.u[i] + Closed(others).inverse(i, i) * weight * (fit.u[i] - prior->mean);
+  return std::clamp(to, parameters.lower()[i], parameters.upper()[i]);
+}
+
 std::vector<Uncertainty::Pair> twins(const Eigen::MatrixXd& covariance, const FreeParameters& parameters) {
   std::vector<Uncertainty::Pair> pairs;
   const auto& names = parameters.names();
@@ -43,15 +69,12 @@ std::vector<Uncertainty::Pair> twins(const Eigen::MatrixXd& covariance, const Fr
 
 Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_priors) {
   const Eigen::MatrixXd& j = fit.linearisation.slope;
-  const double tau = rms(fit.residuals.distance_mm), precision = 1 / (tau * tau);
+  const double tau = rms(fit.residuals.distance_mm);
   Uncertainty result;
   result.errors = fit_error_model(fit.residuals, j);
   result.effective_points = result.errors.effective_count(fit.residuals);
-  Eigen::MatrixXd priors = Eigen::MatrixXd::Zero(parameters.size(), parameters.size());
-  if (use_priors) priors.diagonal() = parameters.prior_information();
-  if (fit.own_information.size() > 0) priors += fit.own_information;  // normal about what was measured, as priors are
-  const Eigen::MatrixXd data = precision * (j.transpose() * j);
-  const Eigen::MatrixXd spread = precision * precision * weighted_product(result.errors, fit.residuals, j, j);
+  const auto& [data, spread] = result.points = points_information(fit, result.errors);
+  const Eigen::MatrixXd priors = prior_matrix(fit, parameters, use_priors);
   const Closed closed(data + priors);
   result.white = closed.inverse;
   result.covariance = closed.sandwich(spread + priors);
@@ -59,6 +82,24 @@ Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_pri
   result.rank = static_cast<int>((result.singular.array() > 1e-6 * result.singular[0]).count());
   result.not_told_apart = twins(Closed(data).sandwich(spread), parameters);
   return result;
+}
+
+std::vector<std::optional<Likelihood>> likelihoods(const Fit& fit, const FreeParameters& parameters,
+                                                   const Uncertainty& uncertainty, bool use_priors) {
+  const auto& [data, spread] = uncertainty.points;
+  std::vector<std::optional<Likelihood>> all;
+  for (Eigen::Index i = 0; i < parameters.size(); ++i) {
+    const auto& prior = parameters.priors()[static_cast<std::size_t>(i)];
+    Eigen::MatrixXd others = prior_matrix(fit, parameters, use_priors);
+    if (use_priors && prior) others(i, i) -= 1 / (prior->sd * prior->sd);
+    const double variance = Closed(data + others).sandwich(spread + others)(i, i);
+    const double range = parameters.upper()[i] - parameters.lower()[i];
+    if (variance * least_information < range * range)
+      all.push_back(Likelihood{use_priors ? without_prior(fit, parameters, i) : fit.u[i], std::sqrt(variance)});
+    else
+      all.push_back(std::nullopt);
+  }
+  return all;
 }
 
 std::vector<Interval> linear_intervals(const Fit& fit, const FreeParameters& parameters,

@@ -8,6 +8,7 @@
 
 #include "calibration/error_model.h"
 #include "calibration/least_squares.h"
+#include "common/likelihood.h"
 
 namespace supine::calibration {
 
@@ -18,7 +19,12 @@ struct Uncertainty {
   Eigen::MatrixXd covariance;  ///< of the coordinates u, under correlated errors (sandwich)
   Eigen::MatrixXd white;       ///< the same if every point erred by itself with the residuals' rms: too small
   Eigen::VectorXd singular;    ///< of the slopes over the residuals' rms, descending: 1 / sd of each direction
-  int rank;                    ///< directions that the points determine at all (relative to the largest, 1e-6)
+  /// JᵀJ/τ² and JᵀΣJ/τ⁴ of judge().
+  struct Information {
+    Eigen::MatrixXd data, spread;
+  };
+  Information points;
+  int rank;  ///< directions that the points determine at all (relative to the largest, 1e-6)
   /// Parameters that move together (|correlation| > 0.95 from the data alone), with their correlation.
   struct Pair {
     std::string first, second;
@@ -31,6 +37,15 @@ struct Uncertainty {
 /// covariance = H⁻¹ V H⁻¹ (Huber, White). Directions the data leave open and no prior closes get a standard deviation
 /// of 1e3 coordinates.
 Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_priors);
+
+/// What the measurements alone say of each coordinate: its own prior taken out of the estimate and of the spread, those
+/// of the others kept. The estimate moves to where the minimised cost lies without that prior, to first order and
+/// inside the range: u_i + [(H − P_i)⁻¹]_ii (u_i − m_i) / s_i² with H = Fit::information. The variance is that of
+/// judge() without the prior.
+/// @param use_priors  as the fit had it; a fit that minimised no cost stays where it is
+/// @return per coordinate; none where that is no more than a hundredth of what the range says
+std::vector<std::optional<Likelihood>> likelihoods(const Fit& fit, const FreeParameters& parameters,
+                                                   const Uncertainty& uncertainty, bool use_priors);
 
 /// An interval of a parameter's value.
 struct Interval {

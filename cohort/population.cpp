@@ -10,7 +10,6 @@ namespace {
 
 using Eigen::ArrayXd;
 
-constexpr double least_information = 0.01;  // of the prior's
 constexpr int shares = 101, means = 25, spreads = 7, errors = 11;
 
 double ln_normal(double x, double variance) { return -0.5 * (x * x / variance + std::log(2 * M_PI * variance)); }
@@ -129,14 +128,6 @@ double ln_add(double a, double b) {
 }
 
 }  // namespace
-
-std::optional<Likelihood> likelihood_of(const Likelihood& posterior, const std::optional<Likelihood>& prior) {
-  if (!prior) return posterior;
-  const double before = 1 / (prior->sd * prior->sd), after = 1 / (posterior.sd * posterior.sd);
-  const double own = after - before;
-  if (!(own > least_information * before)) return std::nullopt;
-  return Likelihood{(posterior.mean * after - prior->mean * before) / own, 1 / std::sqrt(own)};
-}
 
 NormalPopulation pool_normal(const std::vector<Likelihood>& patients, double about, double wide) {
   constexpr int count = 200, places = 801;

@@ -5,22 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "common/likelihood.h"
+
 namespace supine::cohort {
 
 /// A middle and a 95 % interval.
 struct Estimate {
   double value, low, high;
 };
-
-/// What one patient's measurement says of one number, as a normal likelihood.
-struct Likelihood {
-  double mean, sd;
-};
-
-/// The likelihood behind a normal posterior, its prior taken out again: 1/sd² = 1/posterior² − 1/prior².
-/// @param prior  none: the posterior is the likelihood
-/// @return none where the posterior says no more than a hundredth of what the prior does
-std::optional<Likelihood> likelihood_of(const Likelihood& posterior, const std::optional<Likelihood>& prior);
 
 /// A number of a population, normal over its patients.
 struct NormalPopulation {

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "cohort/population.h"
+#include "cohort/result_checks.h"
 #include "common/error.h"
 
 namespace supine::cohort {
@@ -19,7 +20,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
 
-/// Of ln(modulus) between patients, where no case says what it believed.
+/// Of ln(modulus) between patients, 1 sigma: what is believed before any is measured.
 constexpr double usual_spread = 0.5;
 
 Json read_json(const fs::path& file) {
@@ -54,31 +55,41 @@ auto reading(const CaseResults& one, const char* file, const Read& read) {
 
 /// What one case says of one modulus or other free number, in its coordinate.
 struct Known {
-  std::string name, unit, coordinate;
+  std::string name, unit;
   Likelihood likelihood;
-  std::optional<double> prior_mean, prior_sd;
+  std::optional<double> prior_mean;
 };
+
+Json coordinates_of(const CaseResults& one) {
+  const Json::json_pointer place("/worth/coordinates");
+  return one.calibration.is_object() ? one.calibration.value(place, Json::array()) : Json::array();
+}
+
+/// Earlier versions told the interval alone, in which the prior counts to an unknown part.
+bool is_of_an_earlier_version(const CaseResults& one) {
+  const Json coordinates = coordinates_of(one);
+  return std::any_of(coordinates.begin(), coordinates.end(), [](const Json& c) { return !c.contains("likelihood"); });
+}
 
 std::vector<Known> numbers_of(const CaseResults& one) {
   std::vector<Known> known;
-  if (!one.calibration.is_object()) return known;
-  const bool priors = !one.calibration.value(Json::json_pointer("/provenance/options/no-priors"), false);
-  for (const Json& c : one.calibration.value(Json::json_pointer("/worth/coordinates"), Json::array())) {
-    if (!c.contains("at") || !c.at("sd").is_number() || c.at("coordinate") != "ln(value)") continue;
-    Known number{c.at("name"), "", c.at("coordinate"), {}, {}, {}};
+  if (is_of_an_earlier_version(one)) return known;
+  for (const Json& c : coordinates_of(one)) {
+    if (c.at("likelihood").is_null() || c.at("coordinate") != "ln(value)") continue;
+    Known number{c.at("name"), "", {c.at("likelihood").at("mean"), c.at("likelihood").at("sd")}, {}};
     for (const Json& p : one.calibration.at("parameters"))
       if (p.at("name") == number.name) number.unit = p.at("unit");
-    std::optional<Likelihood> prior;
-    if (priors && c.at("prior_sd").is_number()) {
-      prior = Likelihood{c.at("prior_mean"), c.at("prior_sd")};
-      number.prior_mean = prior->mean, number.prior_sd = prior->sd;
-    }
-    const auto likelihood = likelihood_of({c.at("at"), c.at("sd")}, prior);
-    if (!likelihood) continue;
-    number.likelihood = *likelihood;
+    if (c.at("prior_mean").is_number()) number.prior_mean = c.at("prior_mean");
     known.push_back(number);
   }
   return known;
+}
+
+/// Where the population is believed to lie, which hardly counts: what the first case believes that has a prior.
+double about(const std::vector<std::pair<const CaseResults*, Known>>& known) {
+  for (const auto& [one, number] : known)
+    if (number.prior_mean) return *number.prior_mean;
+  return known.front().second.likelihood.mean;
 }
 
 Ordered moduli_json(const std::vector<CaseResults>& cases) {
@@ -92,10 +103,7 @@ Ordered moduli_json(const std::vector<CaseResults>& cases) {
       std::vector<Likelihood> patients;
       for (const auto& [one, number] : known)
         if (one != left_out) patients.push_back(number.likelihood);
-      const Known& first = known.front().second;
-      return patients.empty() ? std::nullopt
-                              : std::optional(pool_normal(patients, first.prior_mean.value_or(first.likelihood.mean),
-                                                          first.prior_sd.value_or(usual_spread)));
+      return patients.empty() ? std::nullopt : std::optional(pool_normal(patients, about(known), usual_spread));
     };
     const auto all = population(nullptr);
     const auto as_value = [](const Estimate& ln) {
@@ -133,7 +141,7 @@ void gather(const CaseResults& one, const Json& single, Gathered& into) {
   if (single.at("numbers").size() == 1) {
     const Json& n = single.at("numbers").front();
     const Likelihood prior{n.at("prior_mean"), n.at("prior_sd")};
-    patient.strength = likelihood_of({n.at("mean"), n.at("sd")}, prior);
+    if (n.at("sd").is_number()) patient.strength = likelihood_of({n.at("mean"), n.at("sd")}, prior);
     into.number = n.at("name");
     into.evidence.prior_mean = prior.mean, into.evidence.prior_sd = prior.sd;
     into.evidence.null_sd = n.value("null_sd", 0.0);
@@ -203,12 +211,6 @@ Json number_at(const Json& from, const std::string& pointer) {
 /// Columns of the table: name, and what stands there for a case.
 using Row = std::map<std::string, Json>;
 
-void check_interval(const CaseResults& one, const std::string& name, const Json& interval) {
-  if (interval.at(0) <= interval.at(1)) return;
-  throw InputError(fmt::format("{}: the interval of {} is {}, its lower end above the upper; calibrate again",
-                               (one.out / "calibration.json").string(), name, interval.dump()));
-}
-
 Row row_of(const CaseResults& one) {
   Row row;
   row["patient"] = one.name;
@@ -227,7 +229,6 @@ Row row_of(const CaseResults& one) {
   for (const Json& p :
        one.calibration.is_object() ? one.calibration.value("parameters", Json::array()) : Json::array()) {
     const std::string name = p.at("name");
-    check_interval(one, name, p.at("interval95"));
     row[name] = p.at("value"), row[name + " low"] = p.at("interval95").at(0),
     row[name + " high"] = p.at("interval95").at(1);
   }
@@ -236,6 +237,15 @@ Row row_of(const CaseResults& one) {
   for (const Json& a : one.comparison.is_object() ? one.comparison.value("areas", Json::array()) : Json::array())
     row["mean_signed_mm " + a.at("name").get<std::string>()] = a.at("mean_signed_mm");
   return row;
+}
+
+void check_values(const CaseResults& one) {
+  const auto check = [&one](const char* file, const Json& result, const auto& values) {
+    if (result.is_object()) reading(one, file, [&] { values(result, one.out / file); });
+  };
+  check("comparison.json", one.comparison, check_comparison);
+  check("calibration.json", one.calibration, check_calibration);
+  check("diagnosis.json", one.diagnosis, check_diagnosis);
 }
 
 /// A folder that was copied would count its patient twice.
@@ -273,6 +283,7 @@ std::vector<CaseResults> read_results(const fs::path& cohort, const fs::path& ou
   std::sort(cases.begin(), cases.end(), [](const CaseResults& a, const CaseResults& b) { return a.name < b.name; });
   check_no_copy(cases, "calibration.json", &CaseResults::calibration);
   check_no_copy(cases, "diagnosis.json", &CaseResults::diagnosis);
+  for (const CaseResults& one : cases) check_values(one);
   if (cases.empty())
     throw InputError(fmt::format("{} holds no case: none of its folders has a case.toml", cohort.string()));
   if (!any)
@@ -283,10 +294,11 @@ std::vector<CaseResults> read_results(const fs::path& cohort, const fs::path& ou
 }
 
 Ordered pooled(const std::vector<CaseResults>& cases, const PoolOptions& options) {
-  std::size_t diagnosed = 0, without_singles = 0;
+  std::size_t diagnosed = 0, without_singles = 0, without_likelihood = 0;
   Ordered set_aside = Ordered::array(), verdicts = Ordered::object();
   for (const CaseResults& one : cases) {
     if (!one.failed.empty()) set_aside.push_back({{"patient", one.name}, {"message", one.failed}});
+    without_likelihood += is_of_an_earlier_version(one);
     if (!one.diagnosis.is_object()) continue;
     ++diagnosed;
     without_singles += !one.diagnosis.contains("singles");
@@ -297,6 +309,7 @@ Ordered pooled(const std::vector<CaseResults>& cases, const PoolOptions& options
   return {{"patients", cases.size()},
           {"diagnosed", diagnosed},
           {"diagnosed_by_an_earlier_version", without_singles},
+          {"calibrated_by_an_earlier_version", without_likelihood},
           {"set_aside", set_aside},
           {"verdicts", verdicts},
           {"shared_mm", options.shared_mm},

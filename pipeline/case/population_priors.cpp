@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <set>
 
 #include "common/error.h"
 #include "simulation/parameters.h"
@@ -48,10 +49,16 @@ simulation::Model with_population(Run& run, const Case& description, simulation:
   const std::vector<std::string> free = simulation::free_parameters(model);
   const std::string patient = fs::weakly_canonical(description.folder / "case.toml").parent_path().filename().string();
   std::vector<std::string> set;
+  std::set<std::string> told;
   bool left_out = false;
   try {
     for (const Json& row : read.at("numbers")) {
       const std::string name = row.at("name");
+      if (!told.insert(name).second)
+        throw InputError(
+            fmt::format("{}: numbers[] has {} twice; keep one of the two rows, or take a copy of what supine-cohort "
+                        "wrote",
+                        file.string(), name));
       if (std::find(free.begin(), free.end(), name) == free.end()) continue;
       set_prior(file, name, told_to(patient, row, left_out), *simulation::find_setting(model, name));
       set.push_back(name);

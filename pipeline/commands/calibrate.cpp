@@ -59,7 +59,8 @@ class CalibrateTool : public Tool {
                    "linear (from the sensitivities, no further runs), or profile (a few refits per parameter and end)")
         ->check(CLI::IsMember({"profile", "linear"}))
         ->capture_default_str();
-    app.add_option("--population", options_.population, "cmaes: runs per generation, 0 = 4 + 3 ln n, at least 6")
+    app.add_option("--population", options_.population,
+                   "cmaes: runs per generation, at least 5; 0 = the larger of 6 and 4 + 3 ln n")
         ->check(CLI::Range(0, 10000))
         ->capture_default_str();
     app.add_option("--max-evaluations", options_.max_evaluations,

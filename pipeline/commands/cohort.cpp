@@ -73,6 +73,11 @@ class CohortTool : public Tool {
     if (const int old = f["diagnosed_by_an_earlier_version"]; old > 0)
       run.warn(fmt::format(
           "{} diagnoses were made by an earlier version and say nothing of single effects; diagnose them again", old));
+    if (const int old = f["calibrated_by_an_earlier_version"]; old > 0)
+      run.warn(fmt::format(
+          "{} calibrations were made by an earlier version, which does not tell measurement from prior; their moduli "
+          "are not pooled, calibrate again",
+          old));
     for (const auto& n : f["numbers"])
       run.say(fmt::format("  {:<32}{:>9.3g} [{:.3g}, {:.3g}] {} in the median, a factor of {:.2f} between patients",
                           n["name"].get<std::string>(), n["median"]["value"].get<double>(),

@@ -41,7 +41,13 @@ class SensitivityTool : public Tool {
     app.add_option("case", case_folder_, "case folder, holds case.toml")->required();
     app.add_option("mesh", mesh_file_, "imaged mesh, as supine-tetrahedralise writes it (.vtu)")->required();
     app.add_option("--model", model_file_, "whose free parameters are drawn (default: CASE/model.toml)");
-    app.add_option("--samples", samples_, "chain runs")->check(CLI::Range(1, 1000000))->capture_default_str();
+    app.add_option(
+           "--samples", samples_,
+           fmt::format("draws, at least {}; chance alone gives a parameter a share of the variance of 0.2 with 10 "
+                       "draws, 0.04 with 100, 0.01 with 1000 (1 sigma)",
+                       least_samples))
+        ->check(CLI::Range(1, 1000000))
+        ->capture_default_str();
     app.add_option("--law", law_,
                    "prior: log-normal with median value and log-sd ln(1 + prior_sd/value), never negative; normal: the "
                    "study's, mean value and standard deviation prior_sd, what is drawn outside the range is refused")
@@ -59,15 +65,20 @@ class SensitivityTool : public Tool {
 
   Outcome run(Run& run) override {
     run.stage("read");
+    if (draws_.empty() && samples_ < least_samples)
+      throw InputError(fmt::format("--samples {}: must be at least {}: shares of the variance compare classes of draws",
+                                   samples_, least_samples));
     const fs::path target = target_file();
     run.output(target);  // before the work, so that nobody waits for what cannot be written
     if (draws_.empty()) announce_png(run, png_, target);
     const DrawRange range =
         draws_.empty() ? DrawRange{0, static_cast<std::size_t>(samples_)} : parse_draw_range(draws_);
     if (range.end > most_samples) throw InputError(fmt::format("--draws {}: at most {} draws", draws_, most_samples));
-    measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
+    CaseInputs inputs = read_case_inputs(run, case_folder_, mesh_file_, model_file_);
+    const FreeParameters parameters(with_population(run, inputs.description, inputs.model));
+    check_laws(parameters, inputs.model_text.file);
+    measured_ = measure_case(run, std::move(inputs));
     measured_->check_covers_skin(name());  // before a journal is begun
-    const FreeParameters parameters(with_population(run, measured_->description, measured_->model));
     const auto draws = draw(run, parameters, law_, static_cast<int>(range.end), seed_);
     run.stage("runs");
     const SensitivityRows rows =
@@ -151,11 +162,15 @@ class SensitivityTool : public Tool {
         "  MAE model to scan (study): {:.2f} ± {:.2f} mm (mean, sd); 5 % {:.2f}, median {:.2f}, 95 % {:.2f}",
         f["mae_study_mm"]["mean"].get<double>(), f["mae_study_mm"]["sd"].get<double>(), quantile(mae, 0.05),
         quantile(mae, 0.5), quantile(mae, 0.95)));
+    if (f["interaction_share"].is_null())
+      return run.say(
+          fmt::format("  too few draws had an equilibrium to share the variance out, {} are needed", least_samples));
     for (const Json& parameter : f["parameters"])
       run.say(fmt::format("  {:>5.1f} % of the variance from {}", 100 * parameter["variance_share"].get<double>(),
                           parameter["name"].get<std::string>()));
-    run.say(
-        fmt::format("  {:>5.1f} % from the parameters acting together", 100 * f["interaction_share"].get<double>()));
+    if (f["parameters"].size() > 1)
+      run.say(
+          fmt::format("  {:>5.1f} % from the parameters acting together", 100 * f["interaction_share"].get<double>()));
   }
 
   fs::path case_folder_, mesh_file_, model_file_, png_;

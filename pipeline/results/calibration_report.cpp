@@ -55,14 +55,18 @@ Json worth_json(const FreeParameters& parameters, const CalibrationResult& resul
     pairs.push_back({{"first", pair.first}, {"second", pair.second}, {"correlation", pair.correlation}});
   Json coordinates = Json::array();
   for (Eigen::Index i = 0; i < sd.size(); ++i) {
-    const auto& prior = parameters.priors()[static_cast<std::size_t>(i)];
-    coordinates.push_back({{"name", parameters.names()[static_cast<std::size_t>(i)]},
+    const auto k = static_cast<std::size_t>(i);
+    const auto& believed = parameters.priors()[k];
+    const calibration::Prior* prior = result.used_priors && believed ? &*believed : nullptr;
+    const auto& alone = result.likelihoods[k];
+    coordinates.push_back({{"name", parameters.names()[k]},
                            {"coordinate", parameters.is_log(i) ? "ln(value)" : "value, scaled"},
                            {"sd", sd[i]},
                            {"sd_if_points_erred_alone", std::sqrt(u.white(i, i))},
                            {"at", result.fit.u[i]},
                            {"prior_mean", prior ? Json(prior->mean) : Json(nullptr)},
-                           {"prior_sd", prior ? Json(prior->sd) : Json(nullptr)}});
+                           {"prior_sd", prior ? Json(prior->sd) : Json(nullptr)},
+                           {"likelihood", alone ? Json{{"mean", alone->mean}, {"sd", alone->sd}} : Json(nullptr)}});
   }
   return {{"rank", u.rank},
           {"coordinates", coordinates},

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,9 @@ struct CalibrationResult {
   calibration::Fit fit;
   calibration::Uncertainty uncertainty;
   std::vector<calibration::Interval> intervals;
-  std::string interval_kind;  ///< profile, linear or posterior
+  bool used_priors = true;
+  std::vector<std::optional<Likelihood>> likelihoods;  ///< per coordinate, its own prior taken out
+  std::string interval_kind;                           ///< profile, linear or posterior
   std::vector<double> noise_mm;
   calibration::DistanceFigures in_sample;        ///< points that were fitted
   calibration::DistanceFigures held_out_blocks;  ///< the same points, each predicted from a fit without its block

@@ -150,14 +150,15 @@ Json singles_json(const Findings& found) {
           candidate.secant.size() > 0
               ? candidate.secant
               : Eigen::VectorXd(candidate.slope.col(static_cast<Eigen::Index>(k)) * (p.typical - p.null));
-      numbers.push_back({{"name", p.name},
-                         {"mean", known.first},
-                         {"sd", known.second},
-                         {"prior_mean", prior.mean() - p.null},
-                         {"prior_sd", prior.sd()},
-                         {"null_sd", null_sd(found, p.name)},
-                         {"usual", p.typical - p.null},
-                         {"usual_moves_mm", rms(usual)}});
+      numbers.push_back(
+          {{"name", p.name},
+           {"mean", known.first},
+           {"sd", known.second > 0 ? Json(known.second) : Json(nullptr)},  // none: cut at one end of the range
+           {"prior_mean", prior.mean() - p.null},
+           {"prior_sd", prior.sd()},
+           {"null_sd", null_sd(found, p.name)},
+           {"usual", p.typical - p.null},
+           {"usual_moves_mm", rms(usual)}});
     }
     list.push_back({{"effect", candidate.effect},
                     {"ln_bayes_factor", h.ln_evidence - nothing->ln_evidence},

@@ -71,7 +71,10 @@ class Calibration {
                                             : calibration::fit_least_squares(evaluator, parameters_, options);
     run_.stage("worth");
     result.uncertainty = calibration::judge(skin_of(result.fit), parameters_, options.use_priors);
-    if (asked_.method == "joint") result.uncertainty.covariance = posterior;
+    result.used_priors = options.use_priors;
+    result.likelihoods =
+        calibration::likelihoods(skin_of(result.fit), parameters_, result.uncertainty, options.use_priors);
+    if (asked_.method == "joint") take_posterior(posterior, result);
     result.interval_kind = asked_.method == "joint" ? "posterior" : asked_.intervals;
     if (asked_.method == "cmaes") result.interval_kind = "linear";  // another optimum than that of the profiled cost
     result.intervals = calibration::linear_intervals(result.fit, parameters_, result.uncertainty);
@@ -136,6 +139,16 @@ class Calibration {
     result.fit.converged = true;
     result.fit.message = "joint fit with all that is never known";
     return posterior.of_parameters;
+  }
+
+  void take_posterior(const Eigen::MatrixXd& covariance, CalibrationResult& result) const {
+    result.uncertainty.covariance = covariance;
+    for (Eigen::Index i = 0; i < parameters_.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const auto& prior = parameters_.priors()[k];
+      result.likelihoods[k] = likelihood_of({result.fit.u[i], std::sqrt(covariance(i, i))},
+                                            prior ? std::optional<Likelihood>({prior->mean, prior->sd}) : std::nullopt);
+    }
   }
 
   Fit search_cmaes(Evaluator& evaluator, const calibration::FitOptions& fit_options) {
@@ -213,24 +226,43 @@ void CalibrateOptions::check() const {
   check_choice("intervals", intervals, {"linear", "profile"});
   check_range("starts", starts, 1, 1000);
   check_range("robust_mm", robust_mm, above_zero, any);
-  check_range("population", population, 0, 10000);
+  if (population != 0) check_range("population (0 is the usual one)", population, calibration::least_population, 10000);
   check_range("max_evaluations", max_evaluations, 1, any);
-  if (until_mae_mm) check_range("until_mae_mm", *until_mae_mm, 0, any);
+  if (until_mae_mm && !(*until_mae_mm > 0 && *until_mae_mm <= any))
+    throw InputError(fmt::format("until_mae_mm = {}: must be above 0", *until_mae_mm));
   if (!profile_of.empty() && (intervals != "profile" || method != "least-squares"))
     throw InputError("--profile-of goes with --intervals profile and the method least-squares");
   if (!own.empty() && method != "least-squares")
     throw InputError(fmt::format("own residuals go with the method least-squares, not with {}", method));
   if (!own.empty() && intervals == "profile")
     throw InputError("own residuals go with linear intervals: profiles are of the distances alone");
-  if (method != "joint") return;
-  for (const auto& [given, option] :
-       {std::pair(!use_priors, "--no-priors"), std::pair(scan_offset, "--scan-offset"),
-        std::pair(intervals == "profile", "--intervals profile"), std::pair(starts > 1, "--starts")})
-    if (given)
-      throw InputError(
-          fmt::format("{} goes with another method than joint, which has priors, the scans' places and "
-                      "the intervals of its posterior in it; leave {} out, or take --method least-squares",
-                      option, option));
+  check_method_uses();
+}
+
+void CalibrateOptions::check_method_uses() const {
+  const CalibrateOptions usual;
+  struct Use {
+    bool given;
+    const char* option;
+    std::vector<std::string> methods;
+  };
+  const std::vector<Use> uses = {
+      {!use_priors, "--no-priors", {"least-squares", "cmaes"}},
+      {scan_offset, "--scan-offset", {"least-squares", "cmaes"}},
+      {intervals == "profile", "--intervals profile", {"least-squares"}},
+      {starts != usual.starts, "--starts", {"least-squares"}},
+      {robust_mm != usual.robust_mm, "--robust", {"least-squares"}},
+      {population != usual.population, "--population", {"cmaes"}},
+      {max_evaluations != usual.max_evaluations, "--max-evaluations", {"cmaes"}},
+  };
+  for (const auto& [given, option, methods] : uses)
+    if (given && std::find(methods.begin(), methods.end(), method) == methods.end())
+      throw InputError(fmt::format("{} has no effect on --method {}{}; leave it out, or take --method {}", option,
+                                   method,
+                                   method == "joint" ? ", which has priors, the scans' places and the intervals of its "
+                                                       "posterior in it"
+                                                     : "",
+                                   listed(methods)));
 }
 
 FreeParameters parameters_to_fit(Run& run, const MeasuredCase& measured, const CalibrateOptions& options) {

@@ -29,8 +29,11 @@ struct CalibrateOptions {
   std::vector<const calibration::OwnResidual*> own = {};  ///< least-squares: what counts beside the scans
 
   /// @throws InputError  naming the option: a method or kind of interval there is not, a number out of its range, what
-  ///   does not go with the method joint
+  ///   does not go with the method
   void check() const;
+
+ private:
+  void check_method_uses() const;
 };
 
 /// The model's free numbers, with what a population says of them, and where the search begins.

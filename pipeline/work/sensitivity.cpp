@@ -9,6 +9,7 @@
 #include "calibration/evaluator_pool.h"
 #include "common/error.h"
 #include "common/statistics.h"
+#include "simulation/parameters.h"
 
 namespace supine::pipeline {
 
@@ -22,6 +23,18 @@ namespace {
 constexpr double quantiles[] = {0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975};
 
 }  // namespace
+
+void check_laws(const FreeParameters& parameters, const std::filesystem::path& file) {
+  simulation::Model model = parameters.base();
+  for (const std::string& name : parameters.names()) {
+    const simulation::Setting& setting = *simulation::find_setting(model, name);
+    if (!setting.prior_sd)
+      throw InputError(
+          fmt::format("{}: {} is free and has no prior_sd, so there is no law to draw it from; give it one, as in "
+                      "{{ value = {}, prior_sd = {} }}, or fix it: {}",
+                      file.string(), name, setting.value, 0.5 * std::abs(setting.value), setting.value));
+  }
+}
 
 Draws draw(Run& run, const FreeParameters& parameters, const std::string& law, int count, unsigned seed) {
   if (law != "prior" && law != "normal") throw InputError(fmt::format("law = {}: must be prior or normal", law));
@@ -61,7 +74,9 @@ Json sensitivity_figures(const FreeParameters& parameters, const std::string& la
         fmt::format("{} of {} draws had an equilibrium; narrow prior_sd or raise the moduli", mae.size(), samples));
   const Eigen::Map<const Eigen::VectorXd> m(mae.data(), static_cast<Eigen::Index>(mae.size()));
   const double sd = std::sqrt((m.array() - m.mean()).square().sum() / static_cast<double>(m.size() - 1));
-  const Eigen::VectorXd shares = calibration::first_order_shares(values, m);
+  const bool shared_out = mae.size() >= static_cast<std::size_t>(least_samples);
+  const Eigen::VectorXd shares =
+      shared_out ? calibration::first_order_shares(values, m) : Eigen::VectorXd::Zero(parameters.size());
   Json f;
   f["samples"] = samples;
   f["law"] = law;
@@ -75,8 +90,8 @@ Json sensitivity_figures(const FreeParameters& parameters, const std::string& la
     f["parameters"].push_back({{"name", parameters.names()[static_cast<std::size_t>(p)]},
                                {"unit", parameters.unit(p)},
                                {"median", quantile({values.col(p).begin(), values.col(p).end()}, 0.5)},
-                               {"variance_share", shares[p]}});
-  f["interaction_share"] = std::max(0.0, 1 - shares.sum());
+                               {"variance_share", shared_out ? Json(shares[p]) : Json(nullptr)}});
+  f["interaction_share"] = shared_out ? Json(std::max(0.0, 1 - shares.sum())) : Json(nullptr);
   return f;
 }
 

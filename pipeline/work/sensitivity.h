@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -10,6 +11,12 @@
 #include "pipeline/results/sensitivity_table.h"
 
 namespace supine::pipeline {
+
+/// Draws below which shares of the variance are not told: three classes of three.
+inline constexpr int least_samples = 10;
+
+/// @throws InputError  naming @p file and key: a free number without prior_sd
+void check_laws(const calibration::FreeParameters& parameters, const std::filesystem::path& file);
 
 /// Draws of the free numbers, as many as @p count. Warns of those that were refused.
 /// @param law  prior or normal, as --law of supine-sensitivity
@@ -24,6 +31,7 @@ SensitivityRows run_draws(Run& run, const MeasuredCase& measured, const calibrat
                           const calibration::Draws& draws, const DrawRange& range, calibration::RunJournal& journal);
 
 /// Keys of sensitivity.json, as in docs/supine-sensitivity.md.
+/// Shares of the variance are null where fewer than least_samples had an equilibrium.
 /// @param rows  every draw
 /// @throws NumericalFailure  fewer than two draws had an equilibrium
 nlohmann::ordered_json sensitivity_figures(const calibration::FreeParameters& parameters, const std::string& law,

@@ -32,6 +32,9 @@ ImageFile finish(const std::filesystem::path& file, RawImage raw, const std::str
 /// The signs s such that diag(s) takes coordinates of @p frame to LPS; nothing for an unknown frame.
 std::optional<Eigen::Vector3d> signs_to_lps(const std::string& frame);
 
+/// The warning of a volume that does not say where it lies. @param key  that would say it
+std::string no_origin(const std::filesystem::path& file, const std::string& key);
+
 /// @throws InputError  when an axis has no voxel or there are more than 2^31 voxels in all
 void check_size(const std::filesystem::path& file, const Eigen::Vector3i& size);
 

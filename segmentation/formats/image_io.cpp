@@ -119,6 +119,13 @@ std::optional<Eigen::Vector3d> signs_to_lps(const std::string& frame) {
   return std::nullopt;
 }
 
+std::string no_origin(const std::filesystem::path& file, const std::string& key) {
+  return fmt::format(
+      "{}: has no {}, so its first voxel is taken to lie at 0, 0, 0; scans and landmarks must lie as it "
+      "does. Where the origin is known, write it as {}",
+      file.string(), key, key);
+}
+
 void check_size(const std::filesystem::path& file, const Eigen::Vector3i& size) {
   const double count = size.cast<double>().prod();
   if (size.minCoeff() < 1 || count > std::numeric_limits<int>::max())

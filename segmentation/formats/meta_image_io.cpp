@@ -97,6 +97,14 @@ SampleType sample_type(const Header& header) {
   return found->second;
 }
 
+/// What is left over is voxels of another size or type.
+[[noreturn]] void refuse_surplus(const std::filesystem::path& file, std::size_t promised, const std::string& there) {
+  throw InputError(
+      fmt::format("{}: the header promises {} bytes of voxels, and {} follow: DimSize, ElementType or HeaderSize are "
+                  "not those of the data; write the file again",
+                  file.string(), promised, there));
+}
+
 std::vector<std::byte> inflate_bytes(const Header& header, const std::vector<std::byte>& packed, std::size_t wanted) {
   std::vector<std::byte> bytes(wanted);
   z_stream stream{};
@@ -113,7 +121,13 @@ std::vector<std::byte> inflate_bytes(const Header& header, const std::vector<std
     status = inflate(&stream, Z_NO_FLUSH);
     done += room - stream.avail_out;
   }
+  std::byte more{};
+  stream.next_out = reinterpret_cast<Bytef*>(&more);
+  stream.avail_out = 1;
+  if (done == wanted && status == Z_OK) inflate(&stream, Z_NO_FLUSH);
+  const bool left_over = stream.avail_out == 0;
   inflateEnd(&stream);
+  if (done == wanted && left_over) refuse_surplus(header.file, wanted, "more");
   if (done != wanted)
     throw InputError(
         fmt::format("{}: the compressed voxel data end after {} of {} bytes: truncated or damaged; copy the file again",
@@ -141,6 +155,8 @@ std::vector<std::byte> read_bytes(const Header& header, std::size_t wanted) {
     throw InputError(fmt::format("{}: {} bytes of voxel data expected, {} found: truncated; copy the file again",
                                  data_file.string(), wanted,
                                  std::max<std::streamoff>(0, size - std::max<std::streamoff>(0, start))));
+  if (!compressed && static_cast<std::size_t>(size - start) > wanted)
+    refuse_surplus(data_file, wanted, fmt::format("{}", size - start));
   check_holdable(data_file, wanted, static_cast<std::uintmax_t>(size - start), compressed);
   std::vector<std::byte> bytes(compressed ? static_cast<std::size_t>(size - start) : wanted);
   stream.seekg(start);
@@ -157,6 +173,18 @@ void check_kind(const Header& header) {
   refuse_unless("ElementNumberOfChannels", 1, "a scalar volume is needed, not colour");
   if (header.find({"BinaryData"}) && !header.flag({"BinaryData"}))
     header.refuse("BinaryData", "text voxels are not read; save the volume as binary");
+}
+
+/// The spacing stands in ElementSpacing alone: in both it would count twice.
+void check_unit_rows(const Header& header, const Eigen::Matrix3d& direction, const std::vector<double>& spacing) {
+  constexpr double few_digits = 0.01;
+  for (int a = 0; a < 3; ++a)
+    if (const double length = direction.col(a).norm(); !(std::abs(length - 1) <= few_digits))
+      throw InputError(fmt::format(
+          "{}: row {} of TransformMatrix has the length {:.6g}, beside the ElementSpacing {} mm: a row is a "
+          "direction, its length must be 1; divide the row by its length, and see that ElementSpacing is "
+          "the spacing",
+          header.file.string(), a + 1, length, spacing[static_cast<std::size_t>(a)]));
 }
 
 /// What AnatomicalOrientation says of the frame. Its three letters name, per axis, the side the axis comes from (ITK)
@@ -195,14 +223,18 @@ RawImage read_meta_image(const std::filesystem::path& file) {
   const auto spacing = header.numbers({"ElementSpacing", "ElementSize"}, 3);
   if (spacing.empty()) header.refuse("ElementSpacing", "the spacing in mm is needed");
   Eigen::Matrix3d direction = Eigen::Matrix3d::Identity();
-  if (const auto matrix = header.numbers({"TransformMatrix", "Rotation", "Orientation"}, 9); !matrix.empty())
+  if (const auto matrix = header.numbers({"TransformMatrix", "Rotation", "Orientation"}, 9); !matrix.empty()) {
     direction = Eigen::Map<const Eigen::Matrix3d>(matrix.data());  // written axis by axis: column a = axis a
+    check_unit_rows(header, direction, spacing);
+  }
   for (int a = 0; a < 3; ++a) {
     if (!(spacing[a] > 0)) header.refuse("ElementSpacing", "spacings must be > 0 mm");
     image.axes.col(a) = direction.col(a) * spacing[a];
   }
   if (const auto origin = header.numbers({"Offset", "Position", "Origin"}, 3); !origin.empty())
     image.grid.origin_mm = Eigen::Map<const Eigen::Vector3d>(origin.data());
+  else
+    image.warnings.push_back(no_origin(file, "Offset"));
   image.frame = frame_of(header, direction);
   const SampleType type = sample_type(header);
   const bool big_endian = header.flag({"BinaryDataByteOrderMSB", "ElementByteOrderMSB"});

@@ -29,7 +29,7 @@ struct GzClose {
 struct Header {
   bool big_endian = false;
   std::int64_t dim[8] = {};
-  int datatype = 0, unit = 0, qform_code = 0, sform_code = 0;
+  int datatype = 0, bits = 0, unit = 0, qform_code = 0, sform_code = 0;
   double pixdim[8] = {};
   double data_offset = 0, slope = 0, intercept = 0;
   double quaternion[3] = {}, offset[3] = {};
@@ -58,14 +58,15 @@ class Fields {
 
 /// Where the two versions keep the same fields, and how wide they are.
 template <class Real, class Size, class Code>
-Header parse(const Fields& f, const std::array<std::size_t, 9>& at) {
-  const auto [dim, datatype, pixdim, slope, code, quaternion, offset, rows, unit] = at;
+Header parse(const Fields& f, const std::array<std::size_t, 10>& at) {
+  const auto [dim, datatype, pixdim, slope, code, quaternion, offset, rows, unit, bits] = at;
   Header h;
   for (int i = 0; i < 8; ++i) {
     h.dim[i] = f.get<Size>(dim + i * sizeof(Size));
     h.pixdim[i] = f.get<Real>(pixdim + i * sizeof(Real));
   }
   h.datatype = f.get<std::int16_t>(datatype);
+  h.bits = f.get<std::int16_t>(bits);
   h.slope = f.get<Real>(slope);
   h.intercept = f.get<Real>(slope + sizeof(Real));
   h.qform_code = f.get<Code>(code);
@@ -91,6 +92,16 @@ void read_exactly(gzFile_s* stream, const std::filesystem::path& file, std::byte
   }
 }
 
+/// What is left over is voxels of another size or type.
+void check_ended(gzFile_s* stream, const std::filesystem::path& file, std::size_t promised) {
+  std::byte more{};
+  if (gzread(stream, &more, 1) > 0)
+    throw InputError(
+        fmt::format("{}: its header promises {} bytes of voxels, and more follow: dim, datatype or vox_offset are not "
+                    "those of the data; write the file again",
+                    file.string(), promised));
+}
+
 Header read_header(gzFile_s* stream, const std::filesystem::path& file) {
   std::byte bytes[540];
   read_exactly(stream, file, bytes, 348);
@@ -101,8 +112,8 @@ Header read_header(gzFile_s* stream, const std::filesystem::path& file) {
     const bool first = version_size == 348;
     if (!first) read_exactly(stream, file, bytes + 348, 540 - 348);
     Header header =
-        first ? parse<float, std::int16_t, std::int16_t>(fields, {40, 70, 76, 112, 252, 256, 268, 280, 123})
-              : parse<double, std::int64_t, std::int32_t>(fields, {16, 12, 104, 176, 344, 352, 376, 400, 500});
+        first ? parse<float, std::int16_t, std::int16_t>(fields, {40, 70, 76, 112, 252, 256, 268, 280, 123, 72})
+              : parse<double, std::int64_t, std::int32_t>(fields, {16, 12, 104, 176, 344, 352, 376, 400, 500, 14});
     header.data_offset = first ? fields.get<float>(108) : static_cast<double>(fields.get<std::int64_t>(168));
     header.big_endian = big_endian;
     if (std::memcmp(bytes + (first ? 344 : 4), first ? "n+1" : "n+2", 3) != 0)
@@ -113,15 +124,21 @@ Header read_header(gzFile_s* stream, const std::filesystem::path& file) {
   throw InputError(fmt::format("{}: not a NIfTI file (sizeof_hdr is neither 348 nor 540)", file.string()));
 }
 
-SampleType sample_type(const std::filesystem::path& file, int datatype) {
+SampleType sample_type(const std::filesystem::path& file, const Header& header) {
   static const std::map<int, SampleType> types = {
       {2, SampleType::u8},     {4, SampleType::i16},   {8, SampleType::i32},   {16, SampleType::f32},
       {64, SampleType::f64},   {256, SampleType::i8},  {512, SampleType::u16}, {768, SampleType::u32},
       {1024, SampleType::i64}, {1280, SampleType::u64}};
-  const auto found = types.find(datatype);
+  const auto found = types.find(header.datatype);
   if (found == types.end())
     throw InputError(fmt::format("{}: datatype {} is not a scalar type this program reads (colour or complex?)",
-                                 file.string(), datatype));
+                                 file.string(), header.datatype));
+  const int bits = 8 * static_cast<int>(size_of(found->second));
+  if (header.bits != 0 && header.bits != bits)  // 0: not filled in
+    throw InputError(
+        fmt::format("{}: bitpix is {} and datatype {} has {} bits: one of them is not that of the voxels; write the "
+                    "file again",
+                    file.string(), header.bits, header.datatype, bits));
   return found->second;
 }
 
@@ -147,6 +164,47 @@ Eigen::Matrix3d quaternion_axes(const Header& h) {
   return axes;
 }
 
+Eigen::Matrix4d sform(const Header& h) {
+  Eigen::Matrix4d placed = Eigen::Matrix4d::Identity();
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 4; ++c) placed(r, c) = h.rows[r][c];
+  return placed;
+}
+
+Eigen::Matrix4d qform(const Header& h) {
+  Eigen::Matrix4d placed = Eigen::Matrix4d::Identity();
+  placed.topLeftCorner<3, 3>() = quaternion_axes(h);
+  for (int r = 0; r < 3; ++r) placed(r, 3) = h.offset[r];
+  return placed;
+}
+
+/// A resampling that changed one of the two leaves a volume of another size.
+void check_spacing(const std::filesystem::path& file, const Header& h) {
+  const Eigen::Matrix4d placed = sform(h);
+  for (int a = 0; a < 3; ++a) {
+    const double step = placed.block<3, 1>(0, a).norm(), spacing = std::abs(h.pixdim[a + 1]);
+    const double apart = std::abs(step - spacing) * static_cast<double>(h.dim[a + 1] - 1);
+    if (spacing > 0 && apart > std::min(step, spacing))
+      throw InputError(
+          fmt::format("{}: pixdim[{}] is {} mm and column {} of the sform has steps of {:.6g} mm: one of them is not "
+                      "the voxels' spacing; correct it, or write the volume again from its source",
+                      file.string(), a + 1, h.pixdim[a + 1], a + 1, step));
+  }
+}
+
+/// Furthest distance over the volume's corners between where sform and qform place them, mm.
+double forms_apart(const Header& h) {
+  const Eigen::Matrix4d between = sform(h) - qform(h);
+  double furthest = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    Eigen::Vector4d at(0, 0, 0, 1);
+    for (int a = 0; a < 3; ++a)
+      if ((corner >> a & 1) != 0) at[a] = static_cast<double>(h.dim[a + 1] - 1);
+    furthest = std::max(furthest, (between * at).norm());
+  }
+  return furthest;
+}
+
 void place(const std::filesystem::path& file, const Header& h, RawImage& image) {
   if (h.sform_code > 0) {
     for (int r = 0; r < 3; ++r) {
@@ -154,6 +212,13 @@ void place(const std::filesystem::path& file, const Header& h, RawImage& image) 
       image.grid.origin_mm[r] = h.rows[r][3];
     }
     image.frame = "RAS";
+    check_spacing(file, h);
+    const double apart = h.qform_code > 0 ? forms_apart(h) : 0, voxel = image.axes.colwise().norm().minCoeff();
+    if (apart > voxel)
+      image.warnings.push_back(
+          fmt::format("{}: sform (code {}) and qform (code {}) place the volume up to {:.1f} mm apart; the sform is "
+                      "taken. If the qform is right, set sform_code to 0",
+                      file.string(), h.sform_code, h.qform_code, apart));
     return;
   }
   for (int a = 1; a <= 3; ++a)
@@ -180,7 +245,7 @@ RawImage read_nifti(const std::filesystem::path& file) {
   if (!stream) throw InputError(fmt::format("{}: cannot be opened", file.string()));
   const Header h = read_header(stream.get(), file);
   check_kind(file, h);
-  const SampleType type = sample_type(file, h.datatype);
+  const SampleType type = sample_type(file, h);
   RawImage image;
   for (int a = 0; a < 3; ++a)
     image.grid.size[a] = static_cast<int>(std::clamp<std::int64_t>(h.dim[a + 1], 0, 2000000000));
@@ -195,6 +260,7 @@ RawImage read_nifti(const std::filesystem::path& file) {
     throw InputError(fmt::format("{}: vox_offset {} lies beyond the end of the file", file.string(), h.data_offset));
   std::vector<std::byte> bytes(wanted);
   read_exactly(stream.get(), file, bytes.data(), bytes.size());
+  check_ended(stream.get(), file, wanted);
   image.voxels = to_floats(bytes, type, h.big_endian);
   if (h.slope != 0 && (h.slope != 1 || h.intercept != 0))
     for (float& v : image.voxels) v = static_cast<float>(h.slope * v + h.intercept);

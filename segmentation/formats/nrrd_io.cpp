@@ -79,6 +79,8 @@ void check_axes(const std::filesystem::path& file, const Nrrd& nrrd) {
 
 void read_axes(const std::filesystem::path& file, const Nrrd& nrrd, RawImage& image) {
   image.axes.setZero();
+  const bool placed = std::isfinite(nrrd.spaceDim == 3 ? nrrd.spaceOrigin[0] : nrrd.axis[0].min);
+  if (!placed) image.warnings.push_back(no_origin(file, "space origin"));
   for (int a = 0; a < 3; ++a) {
     if (nrrd.spaceDim == 3) {
       for (int c = 0; c < 3; ++c) image.axes(c, a) = nrrd.axis[a].spaceDirection[c];

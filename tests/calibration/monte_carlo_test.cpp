@@ -65,6 +65,12 @@ TEST(MonteCarlo, SharesOfASumOfKnownVariances) {
   EXPECT_NEAR(shares[2], 0, 0.03);
 }
 
+TEST(MonteCarlo, OneParameterHasAllOfTheVarianceAndNothingVariesNothing) {
+  const Eigen::VectorXd x = Eigen::VectorXd::LinSpaced(4, 0, 1);
+  EXPECT_EQ(first_order_shares(x, x.array().square().matrix())[0], 1);
+  EXPECT_EQ(first_order_shares(x, Eigen::VectorXd::Ones(4))[0], 0);
+}
+
 TEST(MonteCarlo, RefusesWhatCannotBeDrawn) {
   simulation::Model model = study_model();
   EXPECT_THROW(draw_parameters(FreeParameters(model), DrawKind::prior, 0, 1), InputError);

@@ -77,6 +77,35 @@ TEST(Uncertainty, PriorsCountAsFurtherInformationWhereTheyAreUsed) {
   EXPECT_LT(with(0, 0), 0.5 * without(0, 0));
 }
 
+TEST(Uncertainty, LikelihoodsDoNotHoldTheirPrior) {
+  simulation::Model start = twin_truth();
+  const Fitted alone(start);
+  const auto told = likelihoods(alone.fit, alone.parameters, judge(alone.fit, alone.parameters, false), false);
+  ASSERT_TRUE(told[0] && told[1]);
+  EXPECT_EQ(told[0]->mean, alone.fit.u[0]) << "without priors the fit stands";
+  // A prior that is off by a tenth and pulls about as hard as the scan.
+  start.breast.young_modulus_kpa.prior_sd = 0.02 * start.breast.young_modulus_kpa.value;
+  start.breast.young_modulus_kpa.value *= 1.1;
+  const Fitted pulled(start);
+  const Uncertainty worth = judge(pulled.fit, pulled.parameters, true);
+  const auto without = likelihoods(pulled.fit, pulled.parameters, worth, true);
+  const double moved = pulled.fit.u[0] - alone.fit.u[0];
+  EXPECT_GT(moved, 0.003) << "the prior does not pull: the test shows nothing";
+  EXPECT_NEAR(without[0]->mean, alone.fit.u[0], 0.2 * moved);
+  EXPECT_NEAR(without[0]->sd, told[0]->sd, 0.1 * told[0]->sd);
+  EXPECT_GT(without[0]->sd, std::sqrt(worth.covariance(0, 0)));
+  EXPECT_LT(without[1]->sd, told[1]->sd) << "of the other parameter the prior stays";
+}
+
+TEST(Uncertainty, WhatTheScanSaysNothingOfHasNoLikelihood) {
+  Fitted f(twin_truth());
+  f.fit.linearisation.slope.col(0) *= 1e-6;
+  f.fit.information.row(0) *= 1e-6, f.fit.information.col(0) *= 1e-6;
+  const auto told = likelihoods(f.fit, f.parameters, judge(f.fit, f.parameters, false), false);
+  EXPECT_FALSE(told[0]);
+  EXPECT_TRUE(told[1]);
+}
+
 TEST(Uncertainty, ModulusAndThicknessOfTheSkinCannotBeToldApart) {
   simulation::Model start = twin_truth();
   start.skin.thickness_mm = {1.5, true, {}, 0.3, 5};

@@ -13,7 +13,7 @@ import tempfile
 import unittest
 
 SOURCE, BIN, SMALL = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
-SETTINGS = "ORDER=1 TRIANGLES=800 MAX_DISTANCE_MM=3 SAMPLES=5"
+SETTINGS = "ORDER=1 TRIANGLES=800 MAX_DISTANCE_MM=3 SAMPLES=10"
 
 
 def run(command):
@@ -65,7 +65,7 @@ class Cohort(unittest.TestCase):
         self.assertIn("skim", first.stdout)
         self.assertNotEqual(first.returncode, 0)
         table = self.cohort / "anna/out/sensitivity.csv"
-        self.assertEqual(len(table.read_text().splitlines()), 6)
+        self.assertEqual(len(table.read_text().splitlines()), 11)
         before = table.stat().st_mtime_ns
         model = self.cohort / "berta/model.toml"
         model.write_text(model.read_text().replace("[skim]", "[skin]"))
@@ -86,18 +86,18 @@ class Cohort(unittest.TestCase):
         for file in ("labels.vti", "mesh.vtu", "sensitivity.csv"):
             self.assertEqual((alone / file).read_bytes(), (here / file).read_bytes(), file)
         self.assertEqual(figures(alone / "sensitivity.json"), figures(here / "sensitivity.json"))
-        self.assertTrue((here / "draws/0-2.csv").exists() and (here / "draws/2-5.csv").exists())
+        self.assertTrue((here / "draws/0-5.csv").exists() and (here / "draws/5-10.csv").exists())
         self.assertIn("skim", (self.work / "out/berta/failed.txt").read_text())
         self.parts_that_do_not_fit_are_refused(here)
 
     def parts_that_do_not_fit_are_refused(self, out):
         merge = [BIN / "supine-sensitivity", self.cohort / "anna", out / "mesh.vtu", "--threads", "1", "-o", self.work / "merged.csv"]
-        first, second = out / "draws/0-2.csv", out / "draws/2-5.csv"
+        first, second = out / "draws/0-5.csv", out / "draws/5-10.csv"
         for words, message in (
-            (["--samples", "5", "--merge", second], "draw 0 is in no part, of 5 that --samples asks for; make it with --draws 0:2"),
-            (["--samples", "5", "--merge", first, first, second], "draw 0 is in another part too"),
-            (["--samples", "4", "--merge", first, second], "holds draws up to 5 and --samples asks for 4"),
-            (["--samples", "5", "--seed", "2", "--merge", first, second], "sample 1 is not what --seed and --law draw"),
+            (["--samples", "10", "--merge", second], "draw 0 is in no part, of 10 that --samples asks for; make it with --draws 0:5"),
+            (["--samples", "10", "--merge", first, first, second], "draw 0 is in another part too"),
+            (["--samples", "11", "--merge", first, second], "draw 10 is in no part, of 11"),
+            (["--samples", "10", "--seed", "2", "--merge", first, second], "sample 1 is not what --seed and --law draw"),
             (["--draws", "7:7"], "--draws 7:7: must be A:B"),
         ):
             said = run([*merge, *words])
@@ -191,6 +191,40 @@ class PriorsOfAPopulation(unittest.TestCase):
             self.assertIn(message, said.stdout)
             self.assertIn("priors.json", said.stdout)
         self.assertFalse((self.work / "fit/calibration.json").exists())
+
+
+class PooledCalibrations(unittest.TestCase):
+    """Three patients of about one modulus: what is pooled is theirs, whatever was believed of it before."""
+
+    def pooled(self, work, prior, *options):
+        patients = []
+        for i in range(3):
+            case = work / f"cohort/P{i}"
+            (case / "out").mkdir(parents=True)
+            shutil.copy(SMALL / "case.toml", case)
+            model = work / f"model{i}.toml"
+            text = (SMALL / "model.toml").read_text().replace("poisson_ratio = 0.45", f"poisson_ratio = 0.44{i + 1}")
+            model.write_text(text.replace("value = 2.0, prior_sd = 1.0", prior))
+            said = run([BIN / "supine-calibrate", SMALL, SMALL / "out/mesh.vtu", "--model", model, "-o", case / "out", "--threads", "1", *options])
+            self.assertIn(said.returncode, (0, 1), said.stdout)
+            patients.append(json.loads((case / "out/calibration.json").read_text()))
+        said = run([BIN / "supine-cohort", work / "cohort"])
+        self.assertEqual(said.returncode, 0, said.stdout)
+        return patients, json.loads((work / "cohort/cohort.json").read_text())["numbers"][0]
+
+    def test_what_was_believed_before_does_not_move_the_population(self):
+        alone = None
+        for prior, options in (("value = 2.0, prior_sd = 1.0", ["--no-priors"]), ("value = 2.0, prior_sd = 1.0", []),
+                               ("value = 2.0, prior_sd = 1e9", []), ("value = 2.0, prior_sd = 0.02", [])):
+            with tempfile.TemporaryDirectory() as folder:
+                patients, found = self.pooled(pathlib.Path(folder), prior, *options)
+            if alone is None:
+                alone = sum(math.log(one["parameters"][0]["value"]) for one in patients) / 3
+                self.assertIsNone(patients[0]["worth"]["coordinates"][0]["prior_mean"])
+                self.assertIsNone(patients[0]["worth"]["coordinates"][0]["prior_sd"])
+            self.assertAlmostEqual(math.log(found["median"]["value"]), alone, delta=0.05, msg=prior)
+            low, high = (math.log(end) for end in found["median"]["interval95"])
+            self.assertTrue(low < alone < high and high - low < 1.5, (prior, low, high))
 
 
 class StagesOnTheWay(unittest.TestCase):

@@ -22,7 +22,7 @@ def modulus(name, ln_seen, noise):
     at, sd = posterior(ln_seen, noise, math.log(0.5), 0.5)
     low, high = math.exp(at - 1.96 * sd), math.exp(at + 1.96 * sd)
     return ({"name": name, "value": math.exp(at), "unit": "kPa", "start": 0.5, "interval95": [low, high], "at_bound": False},
-            {"name": name, "coordinate": "ln(value)", "at": at, "sd": sd, "prior_mean": math.log(0.5), "prior_sd": 0.5})
+            {"name": name, "coordinate": "ln(value)", "at": at, "sd": sd, "prior_mean": math.log(0.5), "prior_sd": 0.5, "likelihood": {"mean": ln_seen, "sd": noise}})
 
 
 def single(effect, seen, noise):

@@ -76,6 +76,16 @@ TEST(Population, WherePatientsAreKnownExactlyTheMeanIsTheirs) {
   EXPECT_GT(found.of_new.sd, found.spread.value);
 }
 
+TEST(Population, WhoseDataSayLittleChangesLittle) {
+  const std::vector<Likelihood> three = {{-0.7, 0.2}, {-0.75, 0.2}, {-0.8, 0.2}};
+  std::vector<Likelihood> four = three;
+  four.push_back({3, 20});
+  const NormalPopulation known = pool_normal(three, 0.7, 0.5), with = pool_normal(four, 0.7, 0.5);
+  EXPECT_NEAR(known.mean.value, -0.75, 0.02);
+  EXPECT_NEAR(with.mean.value, known.mean.value, 0.02);
+  EXPECT_NEAR(with.mean.high - with.mean.low, known.mean.high - known.mean.low, 0.02);
+}
+
 /// A third or less of what one patient shows surely, in 60 % of thirty.
 TEST(Population, AWeakEffectThatNoPatientShowsIsFoundAndItsShareIsInTheInterval) {
   std::mt19937_64 generator(11);

@@ -165,16 +165,16 @@ void put_results(const fs::path& folder) {
       R"({"numbers": [{"name": "breast.young_modulus_kpa", "of_new": {"median": 0.5, "log_sd": 0.3}, "left_out": )"
       R"([{"patient": "P001", "median": 0.4, "log_sd": 0.2}]}]})");
   put(folder, "cohort", "results",
-      joined({R"({"verdict": "missing", "missing": ["ligament"], "unexplained_mm": 0.1, "unexplained95": [0, 0.2], )"
-              R"("included": [{"effect": "ligament", "probability": 1.0}], "singles": [{"effect": "ligament", )"
-              R"("ln_bayes_factor": 9.0, "numbers": [{"name": "ligament.stiffness_kpa_per_mm", "mean": 0.4, )"
-              R"("sd": 0.1, "prior_mean": 0.3, "prior_sd": 0.5, "usual": 0.4, "usual_moves_mm": 1.0}]}]})",
-              R"({"rms_mm": 1.2, "parameters": [{"name": "breast.young_modulus_kpa", "value": 0.3, "unit": "kPa", )"
-              R"("interval95": [0.2, 0.4]}], "worth": {"coordinates": [{"name": "breast.young_modulus_kpa", )"
-              R"~("coordinate": "ln(value)", "at": -1.2, "sd": 0.1, "prior_mean": -1.2, "prior_sd": 0.5}]
-}
-})~",
-              R"({"rms_mm": 1.5, "mae_study_mm": 1.1, "areas": [{"name": "upper outer", "mean_signed_mm": 0.2}]})"}));
+      joined(
+          {R"({"verdict": "missing", "missing": ["ligament"], "unexplained_mm": 0.1, "unexplained95": [0, 0.2], )"
+           R"("included": [{"effect": "ligament", "probability": 1.0}], "singles": [{"effect": "ligament", )"
+           R"("ln_bayes_factor": 9.0, "numbers": [{"name": "ligament.stiffness_kpa_per_mm", "mean": 0.4, )"
+           R"("sd": 0.1, "prior_mean": 0.3, "prior_sd": 0.5, "usual": 0.4, "usual_moves_mm": 1.0}]}]})",
+           R"({"rms_mm": 1.2, "parameters": [{"name": "breast.young_modulus_kpa", "value": 0.3011942, "unit": "kPa", )"
+           R"("interval95": [0.2, 0.4]}], "worth": {"coordinates": [{"name": "breast.young_modulus_kpa", )"
+           R"~("coordinate": "ln(value)", "at": -1.2, "sd": 0.1, "prior_mean": -1.2, "prior_sd": 0.5, )~"
+           R"("likelihood": {"mean": -1.2, "sd": 0.1}}]}})",
+           R"({"rms_mm": 1.5, "mae_study_mm": 1.1, "areas": [{"name": "upper outer", "mean_signed_mm": 0.2}]})"}));
 }
 
 }  // namespace

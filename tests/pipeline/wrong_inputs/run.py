@@ -34,7 +34,7 @@ COMMANDS = {
     "simulate": "{case} {out}/mesh.vtu --model {case}/model.toml -o {out}",
     "compare": "{case} {out}/supine.vtu -o {out}",
     "calibrate": "{case} {out}/mesh.vtu --model {case}/model.toml -o {out}/fitted",
-    "sensitivity": "{case} {out}/mesh.vtu --model {case}/model.toml --samples 2 -o {out}/drawn",
+    "sensitivity": "{case} {out}/mesh.vtu --model {case}/model.toml --samples 10 -o {out}/drawn",
     "diagnose": "{case} {out}/mesh.vtu --model {case}/model.toml -o {out}/diagnosed",
     "targets": "{case} {out}/mesh.vtu --no-other-meshes --no-further-scans -o {out}/found",
     "register": "{case} --shape {out}/supine.vtu -o {out}/placed",

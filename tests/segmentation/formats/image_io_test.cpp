@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+
 #include "tests/segmentation/formats/image_files.h"
 
 namespace supine::segmentation {
@@ -68,6 +72,45 @@ TEST(ImageIo, NiftiWithoutFormsTakesTheCasesFrameAndSaysSo) {
   EXPECT_NEAR((read_image(folder / "a.nii", "RAS").image.grid.direction - Eigen::Matrix3d(flipped.asDiagonal())).norm(),
               0, 1e-12);
   EXPECT_NE(message_of([&] { read_image(folder / "a.nii", ""); }).find("case.frame"), std::string::npos);
+}
+
+TEST(ImageIo, AVolumeThatDoesNotSayWhereItBeginsIsToldOf) {
+  const TemporaryFolder folder;
+  const GreyImage image = numbered_image();
+  write_nrrd(folder / "a.nrrd", image);
+  write_meta_image(folder / "a.mha", image);
+  for (const auto& [file, key] : {std::pair<std::string, std::string>("a.nrrd", "space origin"), {"a.mha", "Offset"}}) {
+    EXPECT_TRUE(read_image(folder / file, "LPS").warnings.empty()) << file;
+    std::ifstream stream(folder / file, std::ios::binary);
+    std::string text{std::istreambuf_iterator<char>(stream), {}};
+    const auto at = text.find("\n" + key) + 1;
+    text.erase(at, text.find('\n', at) + 1 - at);
+    write_text(folder / file, text);
+    const ImageFile read = read_image(folder / file, "LPS");
+    ASSERT_EQ(read.warnings.size(), 1u) << file;
+    EXPECT_NE(read.warnings[0].find(file + ": has no " + key), std::string::npos) << read.warnings[0];
+    EXPECT_EQ(read.image.grid.origin_mm, Eigen::Vector3d::Zero());
+  }
+}
+
+TEST(ImageIo, FormsOfNiftiThatDisagreeAreToldOf) {
+  const TemporaryFolder folder;
+  const auto warnings = [&folder](float offset_x) {
+    write_nifti(folder / "a.nii", numbered_image());
+    std::fstream stream(folder / "a.nii", std::ios::binary | std::ios::in | std::ios::out);
+    const auto put = [&stream](std::streamoff at, auto value) {
+      stream.seekp(at);
+      stream.write(reinterpret_cast<const char*>(&value), sizeof value);
+    };
+    put(252, std::int16_t{1});
+    put(268, offset_x), put(272, -20.0f), put(276, 30.0f);
+    stream.close();
+    return read_image(folder / "a.nii", "LPS").warnings;
+  };
+  EXPECT_TRUE(warnings(10.4f).empty()) << "half a voxel";
+  const auto told = warnings(13);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_NE(told[0].find("3.0 mm apart; the sform is taken"), std::string::npos) << told[0];
 }
 
 TEST(ImageIo, MetaImageOrientationLettersNameTheFrame) {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
 
 #include "segmentation/formats/image_io.h"
 #include "segmentation/formats/labels_io.h"
@@ -132,6 +135,55 @@ TEST_F(ImageRefusal, VoxelThatIsNotANumber) {
 TEST_F(ImageRefusal, UnknownFrame) {
   write_vti(folder_ / "a.vti", numbered_image(), "XYZ");
   expect_refused("a.vti", "\"XYZ\"");
+}
+
+template <class T>
+void overwrite(const std::filesystem::path& file, std::streamoff at, T value) {
+  std::fstream stream(file, std::ios::binary | std::ios::in | std::ios::out);
+  stream.seekp(at);
+  stream.write(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+TEST_F(ImageRefusal, VoxelsThatTheHeaderDoesNotPromise) {
+  const GreyImage image = numbered_image();
+  GreyImage more = image;
+  more.voxels.push_back(1);
+  write_nrrd(folder_ / "a.nrrd", more);
+  write_meta_image(folder_ / "a.mha", more);
+  write_nifti(folder_ / "a.nii", more);
+  write_nifti(folder_ / "a.nii.gz", more);
+  for (const std::string file : {"a.nrrd", "a.mha", "a.nii", "a.nii.gz"}) expect_refused(file, "240 bytes of voxels");
+}
+
+TEST_F(ImageRefusal, PackedVoxelsThatTheHeaderDoesNotPromise) {
+  const std::string text =
+      "NDims = 3\nDimSize = 2 2 2\nElementSpacing = 5 5 5\nOffset = 0 0 0\nCompressedData = True\n"
+      "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+  for (const std::string voxels : {"12345678", "123456789"}) {
+    uLongf size = compressBound(voxels.size());
+    std::string packed(size, ' ');
+    compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(voxels.data()),
+             voxels.size());
+    write_text(folder_ / "a.mha", text + packed.substr(0, size));
+    if (voxels.size() > 8)
+      expect_refused("a.mha", "8 bytes of voxels, and more follow");
+    else
+      EXPECT_EQ(read_image(folder_ / "a.mha", "LPS").image.voxels.size(), 8u);
+  }
+}
+
+TEST_F(ImageRefusal, HeadersThatContradictThemselves) {
+  write_nifti(folder_ / "a.nii", numbered_image());
+  overwrite(folder_ / "a.nii", 84, 2.4f);  // pixdim[2] of 0.8 mm, as a resampling leaves it
+  expect_refused("a.nii", "pixdim[2] is 2.4");
+  expect_refused("a.nii", "steps of 0.8 mm");
+  write_nifti(folder_ / "b.nii", numbered_image());
+  overwrite(folder_ / "b.nii", 72, std::int16_t{8});
+  expect_refused("b.nii", "bitpix is 8 and datatype 16 has 32 bits");
+  overwrite(folder_ / "b.nii", 72, std::int16_t{0});
+  EXPECT_NO_THROW(read_image(folder_ / "b.nii", "LPS")) << "not filled in";
+  write_meta_image(folder_ / "a.mha", numbered_image(3 * Eigen::Matrix3d::Identity()));
+  expect_refused("a.mha", "row 1 of TransformMatrix has the length 3, beside the ElementSpacing 0.7 mm");
 }
 
 TEST_F(ImageRefusal, NotWhatTheExtensionSays) {
