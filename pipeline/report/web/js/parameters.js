@@ -78,8 +78,8 @@
       { rows, columns: Object.keys(rows[0]).map((key) => ({ title: words(key), key, n: true, show: (v) => (typeof v === "number" ? sensible(v) : "–") })),
         caption: `${s.samples} chain runs with parameters drawn from the model file, ${s.failed_solves} of them without equilibrium.` }),
       supine.figure("shares", "Where the spread comes from", supine.chart.bars("Share of the variance per parameter",
-        [...s.parameters.map((p) => ({ label: supine.parameter(p.name), value: 100 * p.variance_share })),
-          { label: "acting together", value: 100 * s.interaction_share, cls: "s5" }], "% of the variance", { digits: 0, high: 100 }),
+        [...s.parameters.filter((p) => p.variance_share !== null).map((p) => ({ label: supine.parameter(p.name), value: 100 * p.variance_share })),
+          ...(s.parameters.length > 1 && s.interaction_share !== null ? [{ label: "acting together", value: 100 * s.interaction_share, cls: "s5" }] : [])], "% of the variance", { digits: 0, high: 100 }),
       { rows: s.parameters, columns: [{ title: "parameter", key: "name" }, { title: "share", key: "variance_share", digits: 3 }] })];
   };
 
