@@ -89,7 +89,8 @@ void check_fits(const Registration& found, const Problem& problem, const std::st
                   "mm off (RMS; bound {} mm). "
                   "A scan of another object{}?",
                   name, 100 * found.overlap, 100 * least_overlap, found.after_mm, most_mm,
-                  problem.landmarks.size() < 3 ? ", or one that lies too far off: name three landmarks or more" : ""));
+                  problem.landmarks.size() < 3 ? ", or one that lies too far off: name three landmarks or more"
+                                               : ", or landmarks in another frame, unit or place than the scan"));
 }
 
 void check_problem(const Problem& problem, const std::string& name) {
