@@ -69,7 +69,7 @@ class CompareTool : public ::testing::Test {
     reconstruction::Surface other_scan = scan;
     other_scan.points.array() += 1e-3;
     reconstruction::write_surface(other_scan, folder / "tilt.vtp");
-    write_landmarks({{"nipple"}, Points(Eigen::RowVector3d(1, 2, 3))}, folder / "prone_landmarks.csv");
+    write_landmarks({{"nipple"}, Points(Eigen::RowVector3d(1, 2, 4))}, folder / "prone_landmarks.csv");
     write_landmarks({{"nipple"}, Points(Eigen::RowVector3d(1, 2, 3))}, folder / "supine_landmarks.csv");
     write_landmarks({{"nipple"}, Points(Eigen::RowVector3d(1, 2, 6))}, out / "supine_landmarks.csv");
     Points positions = mesh.points;

@@ -76,12 +76,12 @@ TEST_F(RegisterTool, SaysThatTheGivenPlaceMayBeTheBetterOne) {
 
 /// 1 sigma of a bony landmark, of what the two files say of it.
 double landmark_sigma_mm(const fs::path& folder, const std::string& imaged, const std::string& measured) {
-  const auto write = [&folder](const char* file, const std::string& sigma) {
+  const auto write = [&folder](const char* file, const char* place, const std::string& sigma) {
     write_text(folder / file,
-               "name,x,y,z" + std::string(sigma.empty() ? "" : ",sigma_mm") + "\nrib,20,5,-30" + sigma + "\n");
+               "name,x,y,z" + std::string(sigma.empty() ? "" : ",sigma_mm") + "\nrib," + place + sigma + "\n");
   };
-  write("imaged.csv", imaged);
-  write("measured.csv", measured);
+  write("imaged.csv", "20,5,-30", imaged);
+  write("measured.csv", "20,5,-30.5", measured);
   const std::string plain = read_text(folder / "case.toml"), key = "surface = \"supine.ply\"";
   write_text(folder / "case.toml", replaced(plain, key, key + "\nlandmarks = \"measured.csv\"") +
                                        "\n[landmarks]\nprone = \"imaged.csv\"\n[register]\nrigid = [\"rib\"]\n");
