@@ -10,7 +10,8 @@ namespace supine::diagnosis {
 /// measure of what the mesh costs.
 ///
 /// The skin's end on the cut face is refined (meshing::refine_skin_edge), where most of the error of linear tetrahedra
-/// comes from (docs/verification.md); the inside is filled anew, tissue fractions are those of the nearest cell of
+/// comes from (docs/verification.md); the inside is filled anew, tissue fractions are means over each new cell of those
+/// of
 /// @p mesh. Of the same order as @p mesh; quadratic ones are bent onto its boundary.
 /// @param skin_edge_share  edge at the skin's end over what it is in @p mesh (the mean edge at the most), in (0, 1)
 /// @throws InputError  when the boundary of @p mesh cannot be filled anew

@@ -5,11 +5,15 @@
 
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "common/error.h"
 
 namespace supine::pipeline {
 
+namespace {
+
+/// The gravity that the sidecar of a shape says it was computed with; none where that is of another tool.
 std::optional<Eigen::Vector3d> gravity_of_shape(const nlohmann::ordered_json& sidecar) {
   if (!sidecar.is_object() || !sidecar.contains("gravity")) return std::nullopt;
   const nlohmann::ordered_json& used = sidecar["gravity"];
@@ -21,6 +25,8 @@ std::optional<Eigen::Vector3d> gravity_of_shape(const nlohmann::ordered_json& si
   }
   return gravity;
 }
+
+}  // namespace
 
 bool is_of_other_gravity(const nlohmann::ordered_json& sidecar, const Pose& pose) {
   constexpr double rounded = 1e-6;

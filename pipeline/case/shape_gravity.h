@@ -3,16 +3,13 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "pipeline/case/case.h"
 
 namespace supine::pipeline {
 
-/// The gravity that the sidecar of a shape says it was computed with; none where that is of another tool.
-std::optional<Eigen::Vector3d> gravity_of_shape(const nlohmann::ordered_json& sidecar);
-
-/// Whether that is another one than the case states now.
+/// Whether the sidecar of a shape says that it was computed with another gravity than the case states now; one of
+/// another tool says nothing.
 bool is_of_other_gravity(const nlohmann::ordered_json& sidecar, const Pose& pose);
 
 /// Whether a shape was computed with the gravity that the case states now. supine-simulate writes it beside POSE.vtu,

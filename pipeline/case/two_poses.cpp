@@ -3,12 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-#include <nlohmann/json.hpp>
-
 #include "common/error.h"
 #include "meshing/topology.h"
 #include "pipeline/case/shape_gravity.h"
+#include "pipeline/tool/lineage.h"
 #include "simulation/solve/folds.h"
 
 namespace supine::pipeline {
@@ -28,24 +26,10 @@ meshing::PoseMesh read_shape(Run& run, const Case& measured, const fs::path& fol
   return meshing::read_pose(run.input(file), pose);
 }
 
-/// Hashes that a shape's sidecar names for one of its inputs; empty where there is none.
-std::string hash_of_input(const fs::path& shape, const std::string& name) {
-  std::ifstream stream(fs::path(shape).replace_extension(".json"));
-  const auto figures = nlohmann::json::parse(stream, nullptr, false);
-  const auto inputs = nlohmann::json::json_pointer("/provenance/inputs");
-  if (!figures.is_object() || !figures.contains(inputs) || !figures[inputs].is_array()) return {};
-  for (const auto& input : figures[inputs])
-    if (input.is_object() && input.value("file", nlohmann::json()) == name) {
-      const auto hash = input.value("sha256", nlohmann::json());
-      return hash.is_string() ? hash.get<std::string>() : std::string();
-    }
-  return {};
-}
-
 /// Shapes of two models do not belong together, even on one mesh. What a sidecar does not say is not asked.
 void check_one_model(const fs::path& folder, const std::string& from, const std::string& to) {
-  const std::string a = hash_of_input(folder / (from + ".vtu"), "model.toml"),
-                    b = hash_of_input(folder / (to + ".vtu"), "model.toml");
+  const auto a = input_hashes(folder / (from + ".vtu"), "model.toml"),
+             b = input_hashes(folder / (to + ".vtu"), "model.toml");
   if (a.empty() || b.empty() || a == b) return;
   throw InputError(
       fmt::format("{0}.vtu and {1}.vtu in {2} were computed with two states of model.toml; simulate both "

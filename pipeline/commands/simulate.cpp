@@ -13,6 +13,7 @@
 #include "reconstruction/surface_io.h"
 #include "simulation/embedding.h"
 #include "simulation/export/exported_pose.h"
+#include "simulation/parameters.h"
 #include "simulation/solve/carrying_modulus.h"
 #include "simulation/solve/chain.h"
 
@@ -101,6 +102,7 @@ class SimulateTool : public Tool {
     const auto found = simulation::find_carrying_modulus(in.mesh, in.anatomy, in.model, loads, search);
     const fs::path target = folder() / "model.toml";
     std::ofstream(run.output(target), std::ios::binary) << model_that_carries(in, found.carries_kpa);
+    read_model(run.output(target));
     Json& f = run.figures(target);
     f["carries_kpa"] = found.carries_kpa;
     f["fails_kpa"] = found.fails_kpa ? Json(*found.fails_kpa) : Json(nullptr);
@@ -118,8 +120,9 @@ class SimulateTool : public Tool {
     const std::string name = "breast.young_modulus_kpa";
     std::map<std::string, double> values = {{name, kpa}};
     const simulation::Setting& setting = in.model.breast.young_modulus_kpa;
-    if (setting.free && kpa < setting.lower) values[name + ".lower"] = kpa / 2;
-    if (setting.free && kpa > setting.upper) values[name + ".upper"] = 2 * kpa;
+    const simulation::Parameter& row = *simulation::find_parameter(name);
+    if (setting.free && kpa < setting.lower) values[name + ".lower"] = std::max(row.lower, kpa / 2);
+    if (setting.free && kpa > setting.upper) values[name + ".upper"] = std::min(row.upper, 2 * kpa);
     return with_values(in.model_text, values);
   }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/tool/lineage.h"
 
+#include <algorithm>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "pipeline/tool/hash.h"
 
@@ -19,22 +21,20 @@ std::string text_of(const Json& json, const char* key) {
 
 }  // namespace
 
-bool made_from_another(const Json& figures, const fs::path& input) {
-  if (!figures.is_object() || !figures.contains("provenance") || !fs::exists(input)) return false;
-  const Json& made = figures["provenance"];
-  if (!made.is_object() || !made.contains("inputs") || !made["inputs"].is_array()) return false;
-  bool named = false;
-  for (const Json& one : made["inputs"]) {
-    if (text_of(one, "file") != input.filename()) continue;
-    if (text_of(one, "sha256") == sha256(input)) return false;
-    named = true;
-  }
-  return named;
+std::vector<std::string> input_hashes(const fs::path& product, const std::string& name) {
+  std::ifstream stream(fs::path(product).replace_extension(".json"));
+  const Json figures = Json::parse(stream, nullptr, false);
+  const Json::json_pointer place("/provenance/inputs");
+  std::vector<std::string> hashes;
+  if (!figures.is_object() || !figures.contains(place)) return hashes;
+  for (const Json& input : figures[place])
+    if (text_of(input, "file") == name) hashes.push_back(text_of(input, "sha256"));
+  return hashes;
 }
 
 bool made_from_another(const fs::path& product, const fs::path& input) {
-  std::ifstream stream(fs::path(product).replace_extension(".json"));
-  return made_from_another(Json::parse(stream, nullptr, false), input);
+  const auto hashes = input_hashes(product, input.filename().string());
+  return !hashes.empty() && fs::exists(input) && std::find(hashes.begin(), hashes.end(), sha256(input)) == hashes.end();
 }
 
 }  // namespace supine::pipeline

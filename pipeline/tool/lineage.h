@@ -2,15 +2,17 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 namespace supine::pipeline {
 
-/// Whether the provenance in @p figures (of a sidecar, or of a result that is JSON itself) names an input that is
-/// called as @p input and held something else than it does now. False where it names none of that name.
-bool made_from_another(const nlohmann::ordered_json& figures, const std::filesystem::path& input);
+/// SHA-256 of the inputs of that name that @p product was made of, by the provenance in its sidecar (X.json beside
+/// X.ext, or itself where it is JSON); in the order told, empty where none is told.
+std::vector<std::string> input_hashes(const std::filesystem::path& product, const std::string& name);
 
-/// The same of a file with a sidecar beside it (X.ext with X.json); false where there is none.
+/// Whether @p product was made of a file that is called as @p input and held something else than it does now. False
+/// where it tells of none of that name.
 bool made_from_another(const std::filesystem::path& product, const std::filesystem::path& input);
 
 }  // namespace supine::pipeline
