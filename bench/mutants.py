@@ -5,8 +5,8 @@ mutants.py --table ROWS.jsonl
 
 Makes small changes of the sources of simulation/, calibration/ and diagnosis/, one at a time: a sign, a comparison, a constant, a step by
 one, a condition that is never true, a call of min for max. Each is built in BUILD, a folder of this checkout, and the tests of its folder
-are run: those of the test file that is named after the source or includes its header first, then the rest from the shortest on, until one
-fails or LONGEST_TESTS_S seconds of the processor are spent. One row of ROWS.jsonl a change: caught (a test failed, crashed or did not
+are run: those of the test file that is named after the source or includes its header first, those of its own subfolder, then the rest from
+the shortest on, until one fails or LONGEST_TESTS_S seconds of the processor are spent. One row of ROWS.jsonl a change: caught (a test failed, crashed or did not
 end), SURVIVED, or not built (the compiler refuses it; not counted). The source is put back after each.
 
 The changes are drawn by the seed, the same from the same sources, the folders in turn. A later call goes on where ROWS.jsonl ends. --table
@@ -123,24 +123,30 @@ class Tests:
                         self.seconds[name, f"{suite['name']}.{test['name']}"] = float(test["time"].rstrip("s"))
 
     def near(self, file):
-        """Suites of the test files that are named after the source or include its header."""
-        header, suites = f'"{file.relative_to(ROOT).with_suffix(".h")}"', set()
+        """Suites of the test files that are named after the source or include its header, and of those in the folder of its own name."""
+        source = file.relative_to(ROOT)
+        header, near, beside = f'"{source.with_suffix(".h")}"', set(), set()
         for test in (ROOT / "tests" / self.folder).rglob("*_test.cpp"):
             text = test.read_text()
+            suites = set(re.findall(r"^TEST(?:_F|_P)?\((\w+),", text, re.M))
             if test.name == f"{file.stem}_test.cpp" or header in text:
-                suites |= set(re.findall(r"^TEST(?:_F|_P)?\((\w+),", text, re.M))
-        return suites
+                near |= suites
+            elif test.parent == ROOT / "tests" / source.parent and source.parent.name != self.folder:
+                beside |= suites
+        return near, beside
 
     def batches(self, file):
-        """(executable, names of tests) to run one after the other: near ones, then the rest by their length."""
-        near = self.near(file)
-        rest = []
+        """(executable, names of tests) to run one after the other: near ones, those beside them, then the rest by their length."""
+        rest, mine = [], {}
         for executable in FOLDERS[self.folder]:
-            mine = sorted((s, name) for (where, name), s in self.seconds.items() if where == executable)
-            close = [(s, name) for s, name in mine if name.split(".")[0].split("/")[-1] in near or name.split("/")[0] in near]
-            if close:
-                yield executable, sum(s for s, _ in close), [name for _, name in close]
-            others = [pair for pair in mine if pair not in close]
+            mine[executable] = sorted((s, name) for (where, name), s in self.seconds.items() if where == executable)
+        for suites in self.near(file):
+            for executable, others in mine.items():
+                close = [(s, name) for s, name in others if suites & {name.split(".")[0].split("/")[-1], name.split("/")[0]}]
+                mine[executable] = [pair for pair in others if pair not in close]
+                if close:
+                    yield executable, sum(s for s, _ in close), [name for _, name in close]
+        for executable, others in mine.items():
             for low, high in ((0, 0.3), (0.3, 2), (2, 10), (10, math.inf)):
                 part = [(s, name) for s, name in others if low <= s < high]
                 if part:
