@@ -157,6 +157,17 @@ TEST(PointCloudDistance, BorderIsWhereThePointsEnd) {
   for (int i = 0; i < 6; ++i) EXPECT_EQ(closest.on_border[i], beyond[i]) << i;
 }
 
+TEST(PointCloudDistance, BorderIsTheSameInAnyUnit) {
+  const Points flat = testing::sheet(0, 40, 20).points;
+  const Points queries = testing::random_points(200, -3, 43, 5);
+  for (const double size : {0.01, 100.0}) {
+    ClosestPoints here, there;
+    SurfaceDistance(flat, Triangles(0, 3)).closest(queries, here);
+    SurfaceDistance(Points(size * flat), Triangles(0, 3)).closest(Points(size * queries), there);
+    for (int i = 0; i < queries.rows(); ++i) EXPECT_EQ(here.on_border[i], there.on_border[i]) << size << ", " << i;
+  }
+}
+
 TEST(PointCloudDistance, RowsAlongLinesAreAContourAndPointsSpreadOverASurfaceAreNot) {
   const SurfaceDistance rows(testing::contour(0, 40), Triangles(0, 3));
   EXPECT_TRUE(rows.is_contour());

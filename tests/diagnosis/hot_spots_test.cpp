@@ -122,5 +122,14 @@ TEST_F(HotSpots, TouchingPiecesOfBothSignsStayTwoAndSmallOnesGo) {
   EXPECT_LT(found[0].mean_signed_mm * found[1].mean_signed_mm, 0);
 }
 
+TEST_F(HotSpots, PiecesInOppositeCornersAreOfOneSize) {
+  const double far = n * step_mm;
+  const auto found =
+      spots(error([&](double x, double y) { return 2 * disc(x, y, 0, 0, 25) + 2 * disc(x, y, far, far, 25); }, 0));
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_NEAR(found[0].area_cm2, found[1].area_cm2, 1e-9);
+  EXPECT_NEAR(found[0].mean_signed_mm, found[1].mean_signed_mm, 1e-9);
+}
+
 }  // namespace
 }  // namespace supine::diagnosis

@@ -131,6 +131,10 @@ TEST_F(NullTwin, EveryEffectThatCanBeFeltIsACandidate) {
   EXPECT_FALSE(has("gland_stiffness"));
 }
 
+TEST_F(NullTwin, NothingStandsInForAnEffectWhoseLinesAgree) {
+  for (const Candidate& candidate : found->candidates) EXPECT_FALSE(candidate.stand_in) << candidate.effect;
+}
+
 TEST_F(NullTwin, AFurtherPoseSeparatesMoreThanTheSameAgain) {
   const auto next = next_measurements(subject_of(*twin), *found, {"adhesion", "ligament"});
   ASSERT_GE(next.size(), 2u);
@@ -169,6 +173,22 @@ TEST_F(NullTwin, TheLessIsKnownOfWhereAScanLiesTheLessAFurtherOneSeparates) {
     return best;
   };
   EXPECT_LT(separation(2), 0.9 * separation(0.05));
+}
+
+TEST_F(NullTwin, TheNoisierAFurtherScanTheLessItSeparates) {
+  const auto separation = [](double factor) {
+    const Eigen::VectorXd noise = found->base.noise_of_point_mm;
+    found->base.noise_of_point_mm *= factor;
+    const auto next = next_measurements(subject_of(*twin), *found, {"adhesion", "gravity_tilt"});
+    found->base.noise_of_point_mm = noise;
+    double best = 0;
+    for (const Separation& s : next)
+      if (s.measurement.find("once more") == std::string::npos) best = std::max(best, s.separation);
+    return best;
+  };
+  const double usual = separation(1);
+  EXPECT_GT(usual, 0);
+  EXPECT_LT(separation(5), 0.9 * usual);
 }
 
 TEST_F(NullTwin, TheHotSpotIsWhereTheDistanceIs) {

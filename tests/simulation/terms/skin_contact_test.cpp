@@ -140,6 +140,20 @@ TEST_P(SkinContactTest, AStepStopsWhereTheForcesStillLeadBack) {
   EXPECT_EQ(term->safe_share(X, Eigen::VectorXd(-step)), 1) << "away from each other";
 }
 
+TEST_P(SkinContactTest, AShortStepStopsToo) {
+  Points near = X, down = Points::Zero(X.rows(), 3);
+  near.bottomRows(X.rows() - scene.first_upper).col(2).array() -= 3;  // of a gap of 4
+  const auto share = [&](double mm) {
+    down.bottomRows(X.rows() - scene.first_upper).col(2).setConstant(-mm);
+    return term->safe_share(near, Eigen::Map<const Eigen::VectorXd>(down.data(), down.size()));
+  };
+  constexpr double far = 100;
+  const double until = far * share(far);  // one mm and half the reach of the skin that is met first
+  EXPECT_GT(until, 2);
+  EXPECT_EQ(share(0.95 * until), 1);
+  EXPECT_NEAR(1.2 * until * share(1.2 * until), until, 1e-9 * far);
+}
+
 INSTANTIATE_TEST_SUITE_P(All, SkinContactTest,
                          ::testing::Combine(::testing::Values(1, 2), ::testing::Values(0.0, 0.06)));
 
