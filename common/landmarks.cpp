@@ -27,10 +27,11 @@ std::vector<std::string> split(std::string line) {
 }
 
 double coordinate(const std::string& field, const std::string& place) {
-  const std::size_t first = field.find_first_not_of(' ');
+  std::size_t first = std::min(field.find_first_not_of(' '), field.size());
+  if (field.compare(first, 1, "+") == 0 && field.compare(first + 1, 1, "-") != 0) ++first;
   double value = 0;
   const char* end = field.data() + field.size();
-  const auto parsed = std::from_chars(field.data() + std::min(first, field.size()), end, value);
+  const auto parsed = std::from_chars(field.data() + first, end, value);
   if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(value))
     throw InputError(fmt::format("{}: '{}' is not a finite number; landmarks are name,x,y,z in mm", place, field));
   return value;

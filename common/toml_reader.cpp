@@ -163,7 +163,7 @@ std::optional<std::vector<std::string>> TomlReader::texts(std::string_view key) 
 
 std::optional<std::vector<int>> TomlReader::integers(std::string_view key) const {
   if (!has(key)) return {};
-  return elements<int>(*this, key, "whole numbers", small_integer);
+  return elements<int>(*this, key, "whole numbers (no decimal point, up to 2147483647)", small_integer);
 }
 
 std::optional<Eigen::Vector3d> TomlReader::vector(std::string_view key) const {

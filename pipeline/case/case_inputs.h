@@ -24,7 +24,8 @@ struct CaseInputs {
 /// @throws InputError  a model that is not this body's: check_weight()
 void check_inputs(const CaseInputs& inputs);
 
-/// Reads and checks the files, and notes them as inputs of the run.
+/// Reads and checks the files, and notes them as inputs of the run. Warns of a mesh whose sidecars say that it was made
+/// of another image than the case has.
 /// @param folder      of case.toml
 /// @param mesh_file   as supine-tetrahedralise writes it
 /// @param model_file  empty: FOLDER/model.toml

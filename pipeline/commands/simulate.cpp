@@ -10,6 +10,7 @@
 #include "pipeline/case/case_inputs.h"
 #include "pipeline/case/model_edit.h"
 #include "pipeline/tool/tool.h"
+#include "pipeline/work/passengers.h"
 #include "reconstruction/surface_io.h"
 #include "simulation/embedding.h"
 #include "simulation/export/exported_pose.h"
@@ -27,16 +28,6 @@ using simulation::PoseSolution;
 const std::map<std::string, simulation::Solver> solvers = {{"calculix", simulation::Solver::calculix},
                                                            {"febio", simulation::Solver::febio},
                                                            {"sofa", simulation::Solver::sofa}};
-
-// Prone landmarks are marked on the imaged body: a little noise is to be expected, no more.
-constexpr double landmark_warning_mm = 2, landmark_bound_mm = 10;
-
-/// Surfaces and landmarks that move along with the tissue.
-struct Passenger {
-  std::string name;  // "gland", "tumour", …
-  reconstruction::Surface surface;
-  simulation::Embedding embedding;
-};
 
 class SimulateTool : public Tool {
  public:
@@ -84,11 +75,12 @@ class SimulateTool : public Tool {
     warn_of_locking(run, in);
     const auto loads = loads_of(in.description, asked_.poses);
     if (!export_to_.empty()) simulation::check_exportable(solvers.at(export_to_), in.mesh, in.anatomy, in.model, loads);
-    run.stage("solve");
     if (find_modulus_) return find_modulus(run, in, loads);
+    const Passengers passengers = read_passengers(run, in, mesh_file_.parent_path());
+    run.stage("solve");
     const Simulated simulated = simulate(run, in, asked_);
     run.stage("write");
-    write(run, in, simulated);
+    write(run, in, passengers, simulated);
     if (!export_to_.empty()) write_exports(run, in, simulated);
     say_simulated(run, in, simulated);
     return judge(run, simulated);
@@ -97,6 +89,7 @@ class SimulateTool : public Tool {
  private:
   /// The model as it stands with the modulus that was found: a value or a table { value = … }.
   Outcome find_modulus(Run& run, const CaseInputs& in, const std::vector<simulation::PoseLoad>& loads) const {
+    run.stage("solve");
     simulation::ModulusSearch search;
     search.progress = [&run](double kpa) { run.progress(fmt::format("breast.young_modulus_kpa = {:.3g}", kpa)); };
     const auto found = simulation::find_carrying_modulus(in.mesh, in.anatomy, in.model, loads, search);
@@ -128,65 +121,7 @@ class SimulateTool : public Tool {
 
   fs::path folder() const { return output.empty() ? mesh_file_.parent_path() : output; }
 
-  std::vector<Passenger> passengers(Run& run, const CaseInputs& in) const {
-    std::vector<Passenger> found;
-    for (int tissue = 0; tissue < segmentation::tissue_count; ++tissue) {
-      const std::string name(segmentation::tissue_names[tissue]);
-      const fs::path file = mesh_file_.parent_path() / (name + ".vtp");
-      // A surface of a tissue the mesh does not have is left over from other labels.
-      if (in.mesh.fraction.col(tissue).sum() == 0 || !fs::exists(file)) continue;
-      auto surface = reconstruction::read_surface(run.input(file));
-      simulation::Embedding embedding(in.mesh, surface.points);
-      check_lies_in_mesh(file, surface.points, embedding);
-      found.push_back({name, std::move(surface), std::move(embedding)});
-    }
-    return found;
-  }
-
-  /// An organ of another body, or one that was moved since.
-  static void check_lies_in_mesh(const fs::path& file, const Points& points, const simulation::Embedding& places) {
-    constexpr double far_mm = 5, most_far = 0.1;
-    const auto far = (places.outside_mm().array() > far_mm).count();
-    if (static_cast<double>(far) <= most_far * static_cast<double>(points.rows())) return;
-    Eigen::Index worst = 0;
-    const double distance = places.outside_mm().maxCoeff(&worst);
-    throw InputError(fmt::format(
-        "{}: {:.0f} % of its points lie more than {:g} mm outside the imaged body (bound {:.0f} %), the farthest "
-        "{:.1f} mm "
-        "at ({:.1f}, {:.1f}, {:.1f}) mm. It belongs to another mesh: make it again with supine-reconstruct, or take it "
-        "away",
-        file.string(), 100.0 * static_cast<double>(far) / static_cast<double>(points.rows()), far_mm, 100 * most_far,
-        distance, points(worst, 0), points(worst, 1), points(worst, 2)));
-  }
-
-  void check_landmarks(Run& run, const CaseInputs& in, const Landmarks& landmarks,
-                       const simulation::Embedding& places) const {
-    if (landmarks.names.empty()) return;
-    Eigen::Index worst = 0;
-    const double distance = places.outside_mm().maxCoeff(&worst);
-    if (distance <= landmark_warning_mm) return;
-    const std::string what = fmt::format("{}: landmark '{}' lies {:.1f} mm outside the imaged body",
-                                         in.description.prone_landmarks->string(), landmarks.names[worst], distance);
-    if (distance <= landmark_bound_mm) return run.warn(what + "; it moves along with the closest tissue");
-    Points flipped = landmarks.points;
-    flipped.leftCols<2>() *= -1;
-    const double other = simulation::Embedding(in.mesh, flipped).outside_mm().maxCoeff();
-    throw InputError(fmt::format(
-        "{} (bound {} mm). {}", what, landmark_bound_mm,
-        other <= landmark_bound_mm ? "With x and y negated all lie inside: the file is RAS and case.frame says LPS, or "
-                                     "the other way round"
-                                   : "Check its unit (mm), its frame, and that it was marked in the image itself"));
-  }
-
-  void write(Run& run, const CaseInputs& in, const Simulated& simulated) const {
-    const auto organs = passengers(run, in);
-    std::optional<Landmarks> landmarks;
-    std::optional<simulation::Embedding> landmark_places;
-    if (in.description.prone_landmarks) {
-      landmarks = read_landmarks(run.input(*in.description.prone_landmarks), in.description.frame);
-      landmark_places.emplace(in.mesh, landmarks->points);
-      check_landmarks(run, in, *landmarks, *landmark_places);
-    }
+  void write(Run& run, const CaseInputs& in, const Passengers& passengers, const Simulated& simulated) const {
     std::vector<std::string> names = {simulation::free_of_load};
     if (in.description.imaged_pose != simulation::free_of_load) names.push_back(in.description.imaged_pose);
     for (const PoseSolution& pose : simulated.solution.poses) names.push_back(pose.name);
@@ -195,13 +130,7 @@ class SimulateTool : public Tool {
       write_shape(in, simulated, name, run.output(file));
       run.figures(file) = shape_figures(in, simulated, name);
       const Points& x = shape_of(simulated, name);
-      for (const Passenger& organ : organs) {
-        reconstruction::Surface moved = organ.surface;
-        moved.points = organ.embedding.at(x);
-        reconstruction::write_surface(moved, run.output(folder() / (name + "_" + organ.name + ".vtp")));
-      }
-      if (landmarks)
-        write_landmarks({landmarks->names, landmark_places->at(x)}, run.output(folder() / (name + "_landmarks.csv")));
+      write_passengers(run, passengers, x, folder(), name);
     }
   }
 

@@ -9,6 +9,7 @@
 #include "pipeline/case/case_volume.h"
 #include "pipeline/case/two_poses.h"
 #include "pipeline/case/volume_checks.h"
+#include "pipeline/tool/lineage.h"
 #include "pipeline/tool/tool.h"
 #include "warp/carry_points.h"
 #include "warp/displacement.h"
@@ -125,7 +126,7 @@ class WarpTool : public Tool {
     if (from_.empty()) from_ = measured.imaged_pose;
     const TwoPoses poses = read_two_poses(run, measured, shapes_, from_, to_);
     const bool chosen = !volumes_.empty() || !labels_.empty() || !points_.empty();
-    const Cargo cargo = chosen ? chosen_cargo() : case_cargo(measured);
+    const Cargo cargo = chosen ? chosen_cargo() : case_cargo(run, measured);
     check_names(cargo);
     bool all_carried = true;
     for (const VolumeFile& volume : cargo.volumes) carry_volume(run, measured, poses, volume);
@@ -147,15 +148,19 @@ class WarpTool : public Tool {
   }
 
   /// What the case itself has in the pose.
-  Cargo case_cargo(const Case& measured) const {
+  Cargo case_cargo(Run& run, const Case& measured) const {
     if (from_ != measured.imaged_pose)
       throw InputError(
           fmt::format("the case's own image shows {}; name the volume that shows {}, or points with --points",
                       measured.imaged_pose, from_));
     Cargo cargo;
     for (const fs::path& place : {shapes_, shapes_.parent_path(), case_folder_ / "out"})
-      if (cargo.volumes.empty() && fs::exists(place / "labels.vti"))
-        cargo.volumes.push_back({place / "labels.vti", true});
+      if (const fs::path labels = place / "labels.vti"; cargo.volumes.empty() && fs::exists(labels)) {
+        cargo.volumes.push_back({labels, true});
+        if (made_from_another(place / "mesh.vtu", labels))
+          run.warn(fmt::format("{} is another one than mesh.vtu beside it was made from: are they of the same body?",
+                               labels.string()));
+      }
     const bool grey = measured.image_kind == "mri";
     if (grey || (cargo.volumes.empty() && measured.image_kind == "labels"))
       cargo.volumes.insert(cargo.volumes.begin(), {measured.image_file, !grey});

@@ -40,6 +40,11 @@ TEST_F(LandmarksTest, ReadsAndWritesTheSame) {
   EXPECT_EQ(read_landmarks(copy).points, landmarks.points);
 }
 
+TEST_F(LandmarksTest, NumbersMayHaveTheirSign) {
+  EXPECT_EQ(read_landmarks(write("name,x,y,z\na,+1, +2.5,-3e+1\n")).points.row(0), Eigen::RowVector3d(1, 2.5, -30));
+  expect_refused("name,x,y,z\na,+-1,2,3\n", "'+-1' is not a finite number");
+}
+
 TEST_F(LandmarksTest, SigmaIsReadAndWritten) {
   const Landmarks landmarks = read_landmarks(write("name,x,y,z,sigma_mm\nnipple,1,2,3,1.5\nupper,4,5,6,0.25\n"));
   EXPECT_EQ(landmarks.sigma_mm, Eigen::Vector2d(1.5, 0.25));

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <limits>
 
 #include "common/error.h"
 #include "tests/calibration/shapes.h"
@@ -101,6 +102,16 @@ TEST(ScanReadings, AScanThatFitsInNoReadingIsRefused) {
   EXPECT_NE(check_readings(none, "supine", false, "scan.ply").find("the upper end of the supine scan is not verified"),
             std::string::npos);
   EXPECT_EQ(check_readings(none, "supine", true, "scan.ply"), "") << "landmarks say which end is up";
+}
+
+TEST(ScanReadings, AScanThatNeverMeetsTheSkinIsRefused) {
+  Readings none{{"as given", std::numeric_limits<double>::infinity(), 0}, {}, {}, {}};
+  try {
+    check_readings(none, "supine", true, "scan.ply");
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("scan.ply: too few of its points"), std::string::npos) << error.what();
+  }
 }
 
 TEST(ScanReadings, WhereASymmetricBodyDoesNotTellItsSideThatIsSaid) {

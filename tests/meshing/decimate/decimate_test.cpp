@@ -88,6 +88,15 @@ TEST(Decimate, TightBoundTakesMoreTrianglesAndSaysSo) {
   EXPECT_NE(result.reason.find("0.1 mm"), std::string::npos) << result.reason;
 }
 
+TEST(Decimate, ABoundThatNoCoarserSurfaceKeepsGivesTheInputBack) {
+  const Surface in = ball(40, 4);
+  const DecimateResult result = decimate(in, {.target_triangles = 200, .max_distance_mm = 1e-4});
+  EXPECT_EQ(result.surface.points, in.points);
+  EXPECT_FALSE(result.reached_target);
+  EXPECT_NE(result.reason.find("no coarser surface stays within the bound"), std::string::npos) << result.reason;
+  EXPECT_NE(result.fallback.find("that the surface has"), std::string::npos) << result.fallback;
+}
+
 TEST(Decimate, SmallFeatureIsKeptWhereItIs) {
   // A nipple of 5 mm radius on a dome of 30 mm: edges fit for the dome would cut it off.
   const auto with_nipple = [](const Eigen::Vector3d& at) {
