@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // Made series of drawn torsos through the automatic recipes, against what they were made of.
-//   bench_mri_series t1|fatsat|t2 FIRST COUNT [FOLDER]   a row per seed, then medians; the worst are drawn in FOLDER
+//   bench_mri_series t1|fatsat|t2|both FIRST COUNT [FOLDER]   a row per seed, then medians; the worst are drawn in
+//                                                             FOLDER; both: T1, the fat-suppressed one beside it
 //   bench_mri_series planted SEED                        planted failures and what is said
 #include <fmt/format.h>
 
@@ -8,6 +9,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
+#include <random>
 #include <string>
 
 #include "common/error.h"
@@ -122,8 +125,21 @@ Score score(const phantom::Torso& torso, const phantom::MadeSeries& made, const 
   return s;
 }
 
-segmentation::RecipeResult segment(const segmentation::GreyImage& image, bool fat_bright) {
-  return segmentation::run_recipe(image, segmentation::read_shipped_recipe(fat_bright ? "t1_auto" : "fatsat_auto"));
+segmentation::RecipeResult segment(const segmentation::GreyImage& image, bool fat_bright,
+                                   std::optional<segmentation::GreyImage> second = {}) {
+  return segmentation::run_recipe(image, segmentation::read_shipped_recipe(fat_bright ? "t1_auto" : "fatsat_auto"), {},
+                                  std::move(second));
+}
+
+/// The fat-suppressed series of the same visit: voxels, noise and ghosts of its own, and she has moved by some mm.
+segmentation::GreyImage beside(const phantom::Torso& torso, std::uint64_t seed) {
+  constexpr std::uint64_t other_noise = 1000003;
+  constexpr double most_mm = 3;
+  auto image = phantom::make_series(torso, seed + other_noise, {.series = phantom::Series::fatsat}).image;
+  std::mt19937_64 generator(seed);
+  std::uniform_real_distribution<double> along(-most_mm, most_mm);
+  for (double& mm : image.grid.origin_mm) mm += along(generator);
+  return image;
 }
 
 void draw(const phantom::MadeSeries& made, const segmentation::LabelImage& labels, const std::string& file) {
@@ -131,7 +147,7 @@ void draw(const phantom::MadeSeries& made, const segmentation::LabelImage& label
   segmentation::write_png(segmentation::overlay(labels, &made.image, 2, {}, places), file);
 }
 
-int table(phantom::Series series, std::uint64_t first, int count, const std::string& folder) {
+int table(phantom::Series series, bool both, std::uint64_t first, int count, const std::string& folder) {
   std::vector<double> breast, gland, volume, wall, wall95, breast95, gland95;
   fmt::print(
       "| seed | breast Dice | HD95 mm | ml (true) | gland Dice | HD95 mm | ml (true), by share | wall median / 95 % mm "
@@ -142,7 +158,8 @@ int table(phantom::Series series, std::uint64_t first, int count, const std::str
     const phantom::Torso torso(seed);
     const phantom::MadeSeries made = phantom::make_series(torso, seed, {.series = series});
     try {
-      const auto result = segment(made.image, series == phantom::Series::t1);
+      const auto result =
+          segment(made.image, series == phantom::Series::t1, both ? std::optional(beside(torso, seed)) : std::nullopt);
       const Score s = score(torso, made, result);
       fmt::print(
           "| {} | {:.3f} | {:.1f} | {:.0f} ({:.0f}) | {:.3f} | {:.1f} | {:.0f} ({:.0f}), {:.0f} | {:.1f} / {:.1f} | {} "
@@ -256,12 +273,13 @@ int planted(std::uint64_t seed) {
 int main(int argc, char** argv) {
   if (argc >= 3 && std::strcmp(argv[1], "planted") == 0) return planted(std::strtoull(argv[2], nullptr, 10));
   if (argc < 4) {
-    fmt::print(stderr, "bench_mri_series t1|fatsat|t2 FIRST COUNT [FOLDER], or planted SEED\n");
+    fmt::print(stderr, "bench_mri_series t1|fatsat|t2|both FIRST COUNT [FOLDER], or planted SEED\n");
     return 2;
   }
   const std::string kind = argv[1];
-  return table(kind == "t1"   ? phantom::Series::t1
-               : kind == "t2" ? phantom::Series::t2
-                              : phantom::Series::fatsat,
-               std::strtoull(argv[2], nullptr, 10), std::atoi(argv[3]), argc > 4 ? argv[4] : "");
+  const bool both = kind == "both";
+  return table(kind == "t1" || both ? phantom::Series::t1
+               : kind == "t2"       ? phantom::Series::t2
+                                    : phantom::Series::fatsat,
+               both, std::strtoull(argv[2], nullptr, 10), std::atoi(argv[3]), argc > 4 ? argv[4] : "");
 }

@@ -67,12 +67,14 @@ struct Case {
   std::string body = "breast";  ///< breast or object
   std::string side;             ///< left, right or both; none of an object
 
-  std::filesystem::path image_file;       ///< absolute or relative to the working directory, exists
-  std::string image_kind;                 ///< labels, mri or surface
-  std::string imaged_pose = "prone";      ///< the pose that was imaged; undeformed: free of load
-  std::string image_frame;                ///< of a volume that names none (patient_frame.h); empty = `frame`
-  std::string image_series;               ///< of a DICOM folder: number, description or uid; empty = the only one
-  std::optional<double> segmentation_mm;  ///< how well the place of the imaged skin is known, 1 sigma
+  std::filesystem::path image_file;   ///< absolute or relative to the working directory, exists
+  std::string image_kind;             ///< labels, mri or surface
+  std::string imaged_pose = "prone";  ///< the pose that was imaged; undeformed: free of load
+  std::string image_frame;            ///< of a volume that names none (patient_frame.h); empty = `frame`
+  std::string image_series;           ///< of a DICOM folder: number, description or uid; empty = the only one
+  std::optional<std::filesystem::path> second_file;  ///< another series of the same visit, of an image of kind mri
+  std::string second_series;                         ///< as image_series, of second_file
+  std::optional<double> segmentation_mm;             ///< how well the place of the imaged skin is known, 1 sigma
   AllowedCuts cut;
   std::map<int, segmentation::Tissue> labels;  ///< value in the file → tissue (kind = labels)
   std::optional<segmentation::Recipe> recipe;  ///< kind = mri

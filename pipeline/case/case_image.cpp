@@ -85,6 +85,25 @@ void read_places(const TomlReader& image, bool surface, Case& result) {
     image.fail("supports", "is missing: nothing holds the body; add [image.supports.NAME] with a plane or a surface");
 }
 
+/// A further series that a recipe may look at.
+void read_second(const TomlReader& image, Case& result) {
+  const bool named = image.has("second");
+  if (named && result.image_kind != "mri")
+    image.fail("second", "has no effect: a second series belongs to kind = \"mri\"");
+  if (image.has("second_series") && !named)
+    image.fail("second_series", "has no effect: give the folder of the second series as second");
+  if (!named) return;
+  result.second_file = case_path(image, "second", true);
+  const bool folder = fs::is_directory(*result.second_file);
+  if (const auto series = image.text("second_series")) {
+    if (!folder) image.fail("second_series", "has no effect: second is a file, only a DICOM folder holds series");
+    result.second_series = *series;
+  }
+  if (fs::equivalent(*result.second_file, result.image_file) &&
+      (!folder || result.second_series == result.image_series))
+    image.fail("second", "is the same series as file");
+}
+
 }  // namespace
 
 std::vector<std::string> plain_names(const TomlReader& table) {
@@ -114,8 +133,8 @@ fs::path case_path(const TomlReader& reader, std::string_view key, bool folder_a
 void read_case_image(const TomlReader& file, Case& result) {
   const auto image = file.sub_table("image");
   if (!image) file.fail("image", "table [image] is missing: it names the volume");
-  image->allow(
-      {"file", "kind", "frame", "series", "cut", "rim_mm", "labels", "segmentation_mm", "pose", "supports", "parts"});
+  image->allow({"file", "kind", "frame", "series", "second", "second_series", "cut", "rim_mm", "labels",
+                "segmentation_mm", "pose", "supports", "parts"});
   image->required_text("kind");
   result.image_kind = image->choice("kind", {"labels", "mri", "surface"}, "labels");
   result.imaged_pose = image->text("pose").value_or("prone");
@@ -131,6 +150,7 @@ void read_case_image(const TomlReader& file, Case& result) {
       image->fail("series", "has no effect: image.file is a file, only a DICOM folder holds series");
     result.image_series = *series;
   }
+  read_second(*image, result);
   if (const auto frame = image->text("frame")) {
     if (!axes_of_frame(*frame))
       image->fail("frame",

@@ -160,13 +160,22 @@ class SegmentTool : public Tool {
     run.stage("recipe");
     const segmentation::Recipe recipe = find_recipe(measured, run);
     grey_ = volume.image;
-    auto result = segmentation::run_recipe(std::move(volume.image), recipe,
-                                           [&run](const std::string& line) { run.progress(line); });
+    auto result = segmentation::run_recipe(
+        std::move(volume.image), recipe, [&run](const std::string& line) { run.progress(line); },
+        second_series(run, measured));
     findings.recipe_log = std::move(result.log);
     findings.planes = std::move(result.planes);
     findings.gland_share = std::move(result.fraction_gland);
     findings.doubts = std::move(result.doubts);
     return std::move(result.labels);
+  }
+
+  static std::optional<segmentation::GreyImage> second_series(Run& run, const Case& measured) {
+    if (!measured.second_file) return {};
+    run.progress("reading " + measured.second_file->string());
+    Case second = measured;
+    second.image_series = measured.second_series;
+    return read_case_volume(run, second, *measured.second_file).image;
   }
 
   static void check_frame(const Case& measured, const std::string& named, Run& run) {

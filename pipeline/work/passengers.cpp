@@ -30,8 +30,7 @@ void check_lies_in_mesh(const fs::path& file, const Points& points, const simula
       distance, points(worst, 0), points(worst, 1), points(worst, 2)));
 }
 
-void check_landmarks(Run& run, const CaseInputs& in, const Landmarks& landmarks,
-                     const simulation::Embedding& places) {
+void check_landmarks(Run& run, const CaseInputs& in, const Landmarks& landmarks, const simulation::Embedding& places) {
   if (landmarks.names.empty()) return;
   Eigen::Index worst = 0;
   const double distance = places.outside_mm().maxCoeff(&worst);
@@ -42,11 +41,11 @@ void check_landmarks(Run& run, const CaseInputs& in, const Landmarks& landmarks,
   Points flipped = landmarks.points;
   flipped.leftCols<2>() *= -1;
   const double other = simulation::Embedding(in.mesh, flipped).outside_mm().maxCoeff();
-  throw InputError(fmt::format(
-      "{} (bound {} mm). {}", what, landmark_bound_mm,
-      other <= landmark_bound_mm ? "With x and y negated all lie inside: the file is RAS and case.frame says LPS, or "
-                                   "the other way round"
-                                 : "Check its unit (mm), its frame, and that it was marked in the image itself"));
+  throw InputError(fmt::format("{} (bound {} mm). {}", what, landmark_bound_mm,
+                               other <= landmark_bound_mm
+                                   ? "With x and y negated all lie inside: the file is RAS and case.frame says LPS, or "
+                                     "the other way round"
+                                   : "Check its unit (mm), its frame, and that it was marked in the image itself"));
 }
 
 }  // namespace

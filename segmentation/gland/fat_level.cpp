@@ -96,7 +96,7 @@ void weigh_by_class(Fit& fit, GlandOptions::Contrast contrast) {
   fit.prior = std::clamp(1 - sum / static_cast<double>(fit.samples.size()), 0.02, 0.9);
 }
 
-BSplineField fit_field(const Grid& grid, Fit& fit, const GlandOptions& options) {
+BSplineField fit_field(const Grid& grid, Fit& fit, GlandOptions::Contrast contrast, double shading_mm) {
   std::vector<double> greys;
   for (std::size_t n = 0; n < fit.samples.size(); ++n)
     if (fit.under_skin[n]) greys.push_back(fit.log_grey[n]);
@@ -106,19 +106,19 @@ BSplineField fit_field(const Grid& grid, Fit& fit, const GlandOptions& options) 
     weigh_under_skin(fit);
     field.add(fit.samples, first_spacing_mm);
   }
-  for (double spacing = first_spacing_mm / 1.5; spacing > options.shading_mm * 1.01; spacing /= 1.5)
+  for (double spacing = first_spacing_mm / 1.5; spacing > shading_mm * 1.01; spacing /= 1.5)
     for (int round = 0; round < rounds_a_level; ++round) {
       renew_residuals(fit, field);
-      weigh_by_class(fit, options.contrast);
+      weigh_by_class(fit, contrast);
       field.add(fit.samples, spacing);
     }
   for (int round = 0; round < rounds_a_level; ++round) {
     renew_residuals(fit, field);
-    weigh_by_class(fit, options.contrast);
-    field.add(fit.samples, options.shading_mm);
+    weigh_by_class(fit, contrast);
+    field.add(fit.samples, shading_mm);
   }
   renew_residuals(fit, field);
-  weigh_by_class(fit, options.contrast);
+  weigh_by_class(fit, contrast);
   return field;
 }
 
@@ -136,9 +136,10 @@ BSplineField fit_deviation(const Grid& grid, const Fit& fit) {
 }  // namespace
 
 FatLevel find_fat_level(const GreyImage& image, const Mask& inner, const Mask& under_skin,
-                        const GlandOptions& options) {
+                        GlandOptions::Contrast contrast, double shading_mm) {
   Fit fit = collect(image, inner, under_skin);
-  const BSplineField level = fit_field(image.grid, fit, options), variance = fit_deviation(image.grid, fit);
+  const BSplineField level = fit_field(image.grid, fit, contrast, shading_mm),
+                     variance = fit_deviation(image.grid, fit);
   std::vector<double> levels, deviations;
   for (const FieldSample& s : fit.samples) {
     levels.push_back(level.at(s.i, s.j, s.k));
@@ -159,7 +160,7 @@ FatLevel find_fat_level(const GreyImage& image, const Mask& inner, const Mask& u
         const std::size_t n = grid.index(i, j, k);
         if (!inner[n]) continue;
         result.contrast[n] =
-            static_cast<float>(contrast_of(std::log(std::max(image.voxels[n], least_grey)) - fat[i], options.contrast));
+            static_cast<float>(contrast_of(std::log(std::max(image.voxels[n], least_grey)) - fat[i], contrast));
         result.deviation[n] = static_cast<float>(std::max(least_sd, std::exp(log_variance[i] / 2.0)));
         result.shading[n] = static_cast<float>(std::exp(fat[i] - middle));
       }

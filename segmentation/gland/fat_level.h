@@ -20,6 +20,7 @@ struct FatLevel {
 /// @param inner  the voxels of the breast that may be fat or gland
 /// @param under_skin  those of them that are surely mostly fat
 /// @throws InputError  when there are fewer than 1000 of either
-FatLevel find_fat_level(const GreyImage& image, const Mask& inner, const Mask& under_skin, const GlandOptions& options);
+FatLevel find_fat_level(const GreyImage& image, const Mask& inner, const Mask& under_skin,
+                        GlandOptions::Contrast contrast, double shading_mm);
 
 }  // namespace supine::segmentation

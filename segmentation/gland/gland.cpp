@@ -5,8 +5,10 @@
 #include <cmath>
 
 #include "segmentation/gland/fat_level.h"
+#include "segmentation/gland/fat_shift.h"
 #include "segmentation/gland/gland_outline.h"
 #include "segmentation/gland/gland_place.h"
+#include "segmentation/gland/second_series.h"
 #include "segmentation/gland/tissue_classes.h"
 
 namespace supine::segmentation {
@@ -36,20 +38,56 @@ double volume_ml(const Mask& mask, const Grid& grid) {
   return static_cast<double>(std::count(mask.begin(), mask.end(), 1)) * grid.voxel_volume_mm3() / 1000;
 }
 
-/// Takes out of @p inner where fat is so bright that its suppression failed. @return how much, ml
-double take_out_failed(const FatLevel& fat, double share, const Grid& grid, Mask& inner) {
-  std::size_t count = 0;
+/// What a series says of the voxels of @p inner that it reaches, but where fat is so bright that its suppression
+/// failed.
+SeriesContrast contrast_in(const GreyImage& image, Mask inner, Mask under_skin, GlandOptions::Contrast contrast,
+                           const GlandOptions& options) {
+  for (std::size_t n = 0; n < inner.size(); ++n) {
+    inner[n] = inner[n] && !std::isnan(image.voxels[n]);
+    under_skin[n] = under_skin[n] && inner[n];
+  }
+  SeriesContrast series{find_fat_level(image, inner, under_skin, contrast, options.shading_mm), 0, inner};
+  if (contrast == GlandOptions::Contrast::bright)
+    for (std::size_t n = 0; n < inner.size(); ++n)
+      series.usable[n] = inner[n] && series.fat.shading[n] <= static_cast<float>(options.failed_share);
+  series.pure = pure_contrast(series.fat, series.usable, contrast);
+  return series;
+}
+
+/// Of gland, by the contrast.
+std::vector<float> share_of(const SeriesContrast& series) {
+  std::vector<float> share(series.usable.size(), 0);
+  for (std::size_t n = 0; n < share.size(); ++n)
+    if (series.usable[n]) share[n] = std::clamp(series.fat.contrast[n] / static_cast<float>(series.pure), 0.0F, 1.0F);
+  return share;
+}
+
+/// The share that both series say, where the gland itself lies: in a series without fat suppression its edges are those
+/// of the fat, which the scanner moved.
+SeriesContrast take_together(const GreyImage& image, const SeriesContrast& first, const SeriesContrast& second,
+                             GlandOptions::Contrast contrast, GlandResult::Second& said) {
+  said.fat_sd = second.fat.sd, said.pure = second.pure;
+  SeriesContrast both{share_by_both(first, second), 1, first.usable};
+  for (std::size_t n = 0; n < both.usable.size(); ++n) both.usable[n] = both.usable[n] || second.usable[n];
+  if (contrast == GlandOptions::Contrast::bright) return both;
+  const FatShift shift = find_fat_shift(image, share_of(second), second.usable);
+  said.fat_shift_mm = shift.fat_mm;
+  said.shift_mm += shift.laid_mm + shift.fat_mm;
+  return moved(both, image.grid, shift.laid_mm + shift.fat_mm);
+}
+
+void note_shading(const FatLevel& fat, const Mask& inner, GlandResult& result) {
   for (std::size_t n = 0; n < inner.size(); ++n)
-    if (inner[n] && fat.shading[n] > share) {
-      inner[n] = 0;
-      ++count;
+    if (inner[n]) {
+      result.shading_low = std::min<double>(result.shading_low, fat.shading[n]);
+      result.shading_high = std::max<double>(result.shading_high, fat.shading[n]);
     }
-  return static_cast<double>(count) * grid.voxel_volume_mm3() / 1000;
 }
 
 }  // namespace
 
-GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const GlandOptions& options) {
+GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const GlandOptions& options,
+                       const GreyImage* second) {
   const Grid& grid = image.grid;
   const Depths depths = measure_depths(place, grid);
   Mask inner(place.breast.size()), under_skin(inner.size());
@@ -57,19 +95,22 @@ GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const Gl
     inner[n] = place.breast[n] && depths.skin_mm[n] > options.skin_mm && depths.chest_mm[n] > options.chest_mm;
     under_skin[n] = inner[n] && depths.skin_mm[n] < options.skin_mm + under_skin_mm;
   }
-  const FatLevel fat = find_fat_level(image, inner, under_skin, options);
   GlandResult result;
-  result.fat_sd = fat.sd;
-  for (std::size_t n = 0; n < inner.size(); ++n)
-    if (inner[n]) {
-      result.shading_low = std::min<double>(result.shading_low, fat.shading[n]);
-      result.shading_high = std::max<double>(result.shading_high, fat.shading[n]);
-    }
-  if (options.contrast == GlandOptions::Contrast::bright)
-    result.failed_ml = take_out_failed(fat, options.failed_share, grid, inner);
-  result.pure = pure_contrast(fat, inner, options.contrast);
+  SeriesContrast series = contrast_in(image, inner, under_skin, options.contrast, options);
+  result.fat_sd = series.fat.sd, result.pure = series.pure;
+  note_shading(series.fat, inner, result);
+  if (second != nullptr && options.second) {
+    const SecondSeries laid = lay_over(*second, image, place.breast, under_skin);
+    result.second = {laid.shift_mm, Eigen::Vector3d::Zero(), 0, 0};
+    series = take_together(image, series, contrast_in(laid.image, inner, under_skin, *options.second, options),
+                           options.contrast, *result.second);
+    for (std::size_t n = 0; n < inner.size(); ++n) series.usable[n] = series.usable[n] && inner[n];
+  }
+  result.failed_ml = volume_ml(inner, grid) - volume_ml(series.usable, grid);
+  inner = std::move(series.usable);
+  const FatLevel& fat = series.fat;
   const GlandClasses classes =
-      classify_gland(fat.contrast, fat.deviation, inner, grid, result.pure, options.neighbourhood);
+      classify_gland(fat.contrast, fat.deviation, inner, grid, series.pure, options.neighbourhood);
   Mask looks(inner.size());
   for (std::size_t n = 0; n < looks.size(); ++n) looks[n] = classes.probability[n] > 0.5f;
   const Mask sure = where_gland_lies(looks, place, depths, grid, options);
@@ -80,7 +121,7 @@ GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const Gl
   for (std::size_t n = 0; n < near.size(); ++n) near[n] = sure[n] || result.gland[n];
   near = dilate(near, grid, options.bridge_mm);
   for (std::size_t n = 0; n < inner.size(); ++n) {
-    const float share = std::clamp<float>(fat.contrast[n] / static_cast<float>(result.pure), 0, 1);
+    const float share = std::clamp<float>(fat.contrast[n] / static_cast<float>(series.pure), 0, 1);
     if (near[n] && inner[n]) result.fraction[n] = (result.gland[n] ? 1 : classes.probability[n]) * share;
   }
   return result;

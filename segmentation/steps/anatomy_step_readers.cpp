@@ -81,6 +81,7 @@ Step read_gland(const StepTable& table) {
   step.chest = table.required_text("chest");
   GlandOptions& o = step.options;
   o.contrast = table.required_choice<Contrast>("contrast", {{"dark", Contrast::dark}, {"bright", Contrast::bright}});
+  o.second = table.choice<Contrast>("second", {{"dark", Contrast::dark}, {"bright", Contrast::bright}});
   o.shading_mm = table.number("shading_mm", positive).value_or(o.shading_mm);
   o.neighbourhood = table.number("neighbourhood", not_negative).value_or(o.neighbourhood);
   o.skin_mm = table.number("skin_mm", positive).value_or(o.skin_mm);

@@ -191,7 +191,8 @@ struct Planes {
 };
 
 /// mask = the gland of the breasts, by classes of the grey with their neighbourhood and by its place (find_gland).
-/// Keeps the share of gland in each voxel beside the labels.
+/// Keeps the share of gland in each voxel beside the labels. With options.second a second series takes part where one
+/// is given.
 struct Gland {
   std::string mask;
   std::string body;    ///< a mask of step Body

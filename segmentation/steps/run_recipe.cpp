@@ -26,8 +26,12 @@ constexpr double rounding = 1e-9;
 /// The state the steps share; one overload of run per kind of step, which returns its line of the log.
 class StepRunner {
  public:
-  explicit StepRunner(GreyImage image)
-      : image_(std::move(image)), labels_{image_.grid, std::vector<std::uint8_t>(image_.voxels.size(), 0)} {}
+  StepRunner(GreyImage image, std::optional<GreyImage> second)
+      : image_(std::move(image)),
+        second_(std::move(second)),
+        labels_{image_.grid, std::vector<std::uint8_t>(image_.voxels.size(), 0)} {
+    if (second_) remove_noise_floor(*second_, NoiseFloor{});
+  }
 
   std::string run(const NoiseFloor& step) {
     return fmt::format("noise sigma {:.4g}", remove_noise_floor(image_, step));
@@ -81,6 +85,7 @@ class StepRunner {
   std::string store(const std::string& name, Mask mask);
 
   GreyImage image_;
+  std::optional<GreyImage> second_;
   LabelImage labels_;
   std::map<std::string, Mask> masks_;
   std::map<std::string, ChestWall> walls_;
@@ -262,6 +267,15 @@ std::string StepRunner::run(const Planes& step) {
   return line;
 }
 
+std::string second_words(const GlandResult& result) {
+  if (!result.second) return {};
+  const GlandResult::Second& second = *result.second;
+  return fmt::format(
+      "; second series, moved by ({:.1f}, {:.1f}, {:.1f}) mm: fat scatters by {:.0f} %, pure gland differs from it by "
+      "{:.0f} %",
+      second.shift_mm.x(), second.shift_mm.y(), second.shift_mm.z(), 100 * second.fat_sd, 100 * second.pure);
+}
+
 std::string StepRunner::run(const Gland& step) {
   const auto found = walls_.find(step.chest);
   if (found == walls_.end())
@@ -273,7 +287,7 @@ std::string StepRunner::run(const Gland& step) {
                          wall.torso.sternum_x(wall.z(wall.radius_mm.cols() / 2)),
                          wall.torso.sternum_skin_y_mm,
                          half_turn_y_mm(wall) - flank_mm};
-  GlandResult result = find_gland(image_, place, step.options);
+  GlandResult result = find_gland(image_, place, step.options, second_ ? &*second_ : nullptr);
   fraction_ = std::move(result.fraction);
   const auto voxels = std::count(result.gland.begin(), result.gland.end(), 1);
   masks_[step.mask] = std::move(result.gland);  // may be empty: some breasts show none
@@ -285,7 +299,8 @@ std::string StepRunner::run(const Gland& step) {
              "small, "
              "under the skin)",
              100 * result.fat_sd, 100 * result.pure, result.shading_low, result.shading_high, result.failed_ml,
-             result.aside_ml, place.back_y_mm);
+             result.aside_ml, place.back_y_mm) +
+         second_words(result);
 }
 
 }  // namespace
@@ -296,6 +311,11 @@ void Recipe::set_side(Planes::Side side) {
 }
 
 namespace {
+
+bool looks_at_second(const Step& step) {
+  const auto* gland = std::get_if<Gland>(&step);
+  return gland != nullptr && gland->options.second.has_value();
+}
 
 /// Where the image shows no border between breast and muscle, or two that do not fit, in front of the model's back.
 std::vector<Doubt> doubts_of_wall(const RecipeResult& result) {
@@ -312,10 +332,14 @@ std::vector<Doubt> doubts_of_wall(const RecipeResult& result) {
 
 }  // namespace
 
-RecipeResult run_recipe(GreyImage image, const Recipe& recipe,
-                        const std::function<void(const std::string&)>& progress) {
+RecipeResult run_recipe(GreyImage image, const Recipe& recipe, const std::function<void(const std::string&)>& progress,
+                        std::optional<GreyImage> second) {
+  if (second && std::none_of(recipe.steps.begin(), recipe.steps.end(), looks_at_second))
+    throw InputError(
+        "there is a second series, but no gland step of the recipe has `second` (\"dark\" or \"bright\": what gland "
+        "is beside fat in it)");
   const GreyImage given = recipe.fat_suppressed ? image : GreyImage();
-  StepRunner runner(std::move(image));
+  StepRunner runner(std::move(image), std::move(second));
   RecipeResult result;
   for (std::size_t s = 0; s < recipe.steps.size(); ++s) {
     const std::string title = fmt::format("step {} ({})", s + 1, step_names[recipe.steps[s].index()]);

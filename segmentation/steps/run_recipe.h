@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,10 +24,12 @@ struct RecipeResult {
 
 /// Runs the steps of a recipe on a grey volume.
 /// @param progress  called before each step with a line that says which; may be empty
-/// @throws InputError  an image of another kind than the recipe is for (require_kind); naming the step (number and
-/// kind): a mask that no earlier step made, a seed outside the image or
+/// @param second  another series of the same visit, as its file has it, on any grid: for steps Gland with `second`
+/// @throws InputError  a second series that no step looks at; an image of another kind than the recipe is for
+/// (require_kind); naming the step (number and kind): a mask that no earlier step made, a seed outside the image or
 ///   outside its grey range (with the grey found there), a mask that comes out empty, what the steps themselves throw
 RecipeResult run_recipe(GreyImage image, const Recipe& recipe,
-                        const std::function<void(const std::string&)>& progress = {});
+                        const std::function<void(const std::string&)>& progress = {},
+                        std::optional<GreyImage> second = {});
 
 }  // namespace supine::segmentation

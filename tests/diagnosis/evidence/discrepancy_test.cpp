@@ -40,8 +40,8 @@ class DiscrepancyOfATwin : public ::testing::Test {
     for (Index i = 0; i < all.rows(); ++i)
       for (Index j = 0; j < all.cols(); ++j)
         if (clusters->pose[i] == clusters->pose[j])
-          all(i, j) = share_beyond_forces * gaussian_kernel(clusters->place.row(i), clusters->place.row(j),
-                                                                         beyond_forces_length_mm)(0, 0);
+          all(i, j) = share_beyond_forces *
+                      gaussian_kernel(clusters->place.row(i), clusters->place.row(j), beyond_forces_length_mm)(0, 0);
     return all;
   }
   static Discrepancy* found;

@@ -207,7 +207,7 @@ TEST(FatLevel, FollowsTheSteepShadingBesideACoil) {
         image.voxels.push_back(static_cast<float>((gland ? 40 : 100) * (1 + 2 * std::exp(-from_coil / 12))) +
                                noise(random));
       }
-  const FatLevel fat = find_fat_level(image, inner, under_skin, {});
+  const FatLevel fat = find_fat_level(image, inner, under_skin, GlandOptions::Contrast::dark, 20);
   double sum = 0, count = 0;
   for (std::size_t n = 0; n < beside.size(); ++n)
     if (beside[n]) {
