@@ -15,11 +15,11 @@
 namespace supine::segmentation {
 namespace {
 
-constexpr double blur_mm = 1.5;   // of both series before their gradients
-constexpr double around_mm = 6;   // of the breast: its skin takes part
+constexpr double blur_mm = 1.5;  // of both series before their gradients
+constexpr double around_mm = 6;  // of the breast: its skin takes part
 constexpr std::size_t most_points = 6000;
 constexpr double farthest_mm = 10, coarse_mm = 2, fine_mm = 0.5;
-constexpr double least_peak = 1.25;  // of the agreement of edges at the best shift, over its median over all
+constexpr double least_peak = 1.25;    // of the agreement of edges at the best shift, over its median over all
 constexpr double least_covered = 0.9;  // of the breast
 constexpr double fat_grey = 100;
 
@@ -121,10 +121,10 @@ Eigen::Vector3d find_shift(const GreyImage& image, const GreyImage& series, cons
                     "visit and frame?",
                     farthest_mm, best / *middle, least_peak));
   if (coarse.best.cwiseAbs().maxCoeff() > farthest_mm - 0.5 * coarse_mm)
-    throw InputError(
-        fmt::format("the second series lies ({:.1f}, {:.1f}, {:.1f}) mm from the first, or further (bound {:g} mm along "
-                    "each axis): she moved, or it has another frame; register it first",
-                    fine.best.x(), fine.best.y(), fine.best.z(), farthest_mm));
+    throw InputError(fmt::format(
+        "the second series lies ({:.1f}, {:.1f}, {:.1f}) mm from the first, or further (bound {:g} mm along "
+        "each axis): she moved, or it has another frame; register it first",
+        fine.best.x(), fine.best.y(), fine.best.z(), farthest_mm));
   return fine.best;
 }
 

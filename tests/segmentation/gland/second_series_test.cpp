@@ -27,9 +27,7 @@ Grid grid_of(int x, int y, int z, double spacing_mm, const Vector3d& origin_mm) 
 /// 1 inside, 0 outside, the border smooth over two mm.
 double soft(double depth_mm) { return 1 / (1 + std::exp(-3 * depth_mm)); }
 
-double body_at(const Vector3d& p) {
-  return soft(std::min(46 - std::hypot(p.x() - 56, p.z() - 56), p.y() - 8));
-}
+double body_at(const Vector3d& p) { return soft(std::min(46 - std::hypot(p.x() - 56, p.z() - 56), p.y() - 8)); }
 
 /// Gland: a lump, and a bar that has no symmetry with it.
 double gland_at(const Vector3d& p) {
@@ -152,9 +150,8 @@ TEST(FatShift, IsFoundAlongItsAxisAndNoneWhereThereIsNone) {
 
 TEST(FatShift, WhatIsMovedIsReadFromThere) {
   const Grid grid = grid_of(6, 3, 3, 2, Vector3d::Zero());
-  SeriesContrast ramp{{{}, std::vector<float>(grid.count(), 0.1F), std::vector<float>(grid.count(), 1), 0.1},
-                      1,
-                      Mask(grid.count(), 1)};
+  SeriesContrast ramp{
+      {{}, std::vector<float>(grid.count(), 0.1F), std::vector<float>(grid.count(), 1), 0.1}, 1, Mask(grid.count(), 1)};
   for (std::size_t n = 0; n < grid.count(); ++n) ramp.fat.contrast.push_back(static_cast<float>(n % 6));
   const SeriesContrast there = moved(ramp, grid, Vector3d(3, 0, 0));
   EXPECT_NEAR(there.fat.contrast[grid.index(1, 1, 1)], 2.5, 1e-6);
