@@ -93,7 +93,7 @@ FatShift find_fat_shift(const GreyImage& image, const std::vector<float>& share,
     const auto best = std::min_element(left.begin(), left.end());
     return std::pair(shift(static_cast<int>(best - left.begin())), *best);
   };
-  const auto [laid, unmoved] = least_of(tries * tries * tries, [&](int n) -> FatShift {
+  const auto laid = least_of(tries * tries * tries, [&](int n) -> FatShift {
     const Eigen::Vector3d index(n % tries - slack, n / tries % tries - slack, n / (tries * tries) - slack);
     return {step_mm * axes * index, Eigen::Vector3d::Zero()};
   });
@@ -101,9 +101,9 @@ FatShift find_fat_shift(const GreyImage& image, const std::vector<float>& share,
   const auto count = static_cast<int>(in_plane.size()) * side * tries;
   const auto [found, least] = least_of(count, [&](int n) -> FatShift {
     const Eigen::Vector3d along = step_mm * axes.col(in_plane[static_cast<std::size_t>(n / (side * tries))]);
-    return {laid.laid_mm + (n / side % tries - slack) * along, (n % side - steps) * along};
+    return {laid.first.laid_mm + (n / side % tries - slack) * along, (n % side - steps) * along};
   });
-  return least < (1 - least_gain) * unmoved ? found : FatShift{};
+  return least < (1 - least_gain) * laid.second ? found : FatShift{};
 }
 
 SeriesContrast moved(const SeriesContrast& contrast, const Grid& grid, const Eigen::Vector3d& shift_mm) {
