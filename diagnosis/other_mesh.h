@@ -11,8 +11,7 @@ namespace supine::diagnosis {
 ///
 /// The skin's end on the cut face is refined (meshing::refine_skin_edge), where most of the error of linear tetrahedra
 /// comes from (docs/verification.md); the inside is filled anew, tissue fractions are means over each new cell of those
-/// of
-/// @p mesh. Of the same order as @p mesh; quadratic ones are bent onto its boundary.
+/// of @p mesh. Of the same order as @p mesh; quadratic ones are bent onto its boundary.
 /// @param skin_edge_share  edge at the skin's end over what it is in @p mesh (the mean edge at the most), in (0, 1)
 /// @throws InputError  when the boundary of @p mesh cannot be filled anew
 meshing::TetMesh other_mesh(const meshing::TetMesh& mesh, double skin_edge_share);

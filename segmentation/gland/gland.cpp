@@ -66,6 +66,7 @@ std::vector<float> share_of(const SeriesContrast& series) {
 /// of the fat, which the scanner moved.
 SeriesContrast take_together(const GreyImage& image, const SeriesContrast& first, const SeriesContrast& second,
                              GlandOptions::Contrast contrast, GlandResult::Second& said) {
+  check_contrast(first, second);
   said.fat_sd = second.fat.sd, said.pure = second.pure;
   SeriesContrast both{share_by_both(first, second), 1, first.usable};
   for (std::size_t n = 0; n < both.usable.size(); ++n) both.usable[n] = both.usable[n] || second.usable[n];

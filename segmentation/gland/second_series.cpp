@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "common/error.h"
+#include "common/statistics.h"
 #include "segmentation/blur.h"
 #include "segmentation/chest/sampler.h"
 
@@ -106,20 +107,23 @@ Lattice search(const std::vector<Edge>& first, const Vectors& second, const Eige
   return lattice;
 }
 
+double median_of(const std::vector<double>& values) {
+  return median(Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));
+}
+
 Eigen::Vector3d find_shift(const GreyImage& image, const GreyImage& series, const Mask& breast) {
   const std::vector<Edge> first = clear_edges(image, breast);
   const Vectors second = edges_of(series);
   Lattice coarse = search(first, second, Eigen::Vector3d::Zero(), farthest_mm, coarse_mm);
   const Lattice fine = search(first, second, coarse.best, coarse_mm, fine_mm);
   const double best = *std::max_element(fine.agreement.begin(), fine.agreement.end());
-  const auto middle = coarse.agreement.begin() + static_cast<std::ptrdiff_t>(coarse.agreement.size() / 2);
-  std::nth_element(coarse.agreement.begin(), middle, coarse.agreement.end());
-  if (!(best > least_peak * *middle))
+  const double usual = median_of(coarse.agreement);
+  if (!(best > least_peak * usual))
     throw InputError(
         fmt::format("the second series does not show this body: wherever it is moved within {:g} mm, edges in it lie "
                     "on those of the first no better than by chance ({:.2f} times, bound {:g}); is it of the same "
                     "visit and frame?",
-                    farthest_mm, best / *middle, least_peak));
+                    farthest_mm, best / usual, least_peak));
   if (coarse.best.cwiseAbs().maxCoeff() > farthest_mm - 0.5 * coarse_mm)
     throw InputError(fmt::format(
         "the second series lies ({:.1f}, {:.1f}, {:.1f}) mm from the first, or further (bound {:g} mm along "
@@ -148,15 +152,12 @@ float mean_over_voxel(const GreyImage& series, const Grid& grid, const Eigen::Ve
   return static_cast<float>(sum / static_cast<double>(parts.size()));
 }
 
-/// Median of the finite greys of a mask, > 0.
-double median_of(const GreyImage& image, const Mask& mask) {
-  std::vector<float> greys;
+/// Median grey of those voxels that the series reaches; 0 where it reaches none.
+double median_grey(const GreyImage& image, const Mask& mask) {
+  std::vector<double> greys;
   for (std::size_t n = 0; n < mask.size(); ++n)
     if (mask[n] && std::isfinite(image.voxels[n])) greys.push_back(image.voxels[n]);
-  if (greys.empty()) return 0;
-  const auto middle = greys.begin() + static_cast<std::ptrdiff_t>(greys.size() / 2);
-  std::nth_element(greys.begin(), middle, greys.end());
-  return *middle;
+  return greys.empty() ? 0 : median_of(greys);
 }
 
 void check_covered(const GreyImage& image, const Mask& breast) {
@@ -185,15 +186,19 @@ SecondSeries lay_over(const GreyImage& series, const GreyImage& image, const Mas
         if (const std::size_t n = grid.index(i, j, k); breast[n])
           second.image.voxels[n] = mean_over_voxel(series, grid, Eigen::Vector3d(i, j, k), second.shift_mm, parts);
   check_covered(second.image, breast);
-  const double fat = median_of(second.image, under_skin);
-  if (!(fat > 0)) throw InputError("the second series is empty under the breast's skin");
+  const double fat = median_grey(second.image, under_skin);
+  if (!(fat > 0))
+    throw InputError(
+        "the fat of the second series is no brighter than its noise (median 0 under the breast's skin): gland cannot "
+        "be "
+        "told from it by a contrast; leave the series out");
   for (float& grey : second.image.voxels) grey *= static_cast<float>(fat_grey / fat);
   return second;
 }
 
 FatLevel share_by_both(const SeriesContrast& first, const SeriesContrast& second) {
   FatLevel both = first.fat;
-  std::vector<float> deviations;
+  std::vector<double> deviations;
   for (std::size_t n = 0; n < both.contrast.size(); ++n) {
     double sum = 0, information = 0;
     for (const SeriesContrast* one : {&first, &second}) {
@@ -206,12 +211,25 @@ FatLevel share_by_both(const SeriesContrast& first, const SeriesContrast& second
     both.deviation[n] = information > 0 ? static_cast<float>(1 / std::sqrt(information)) : 1.0F;
     if (information > 0) deviations.push_back(both.deviation[n]);
   }
-  if (!deviations.empty()) {
-    const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
-    std::nth_element(deviations.begin(), middle, deviations.end());
-    both.sd = *middle;
-  }
+  if (!deviations.empty()) both.sd = median_of(deviations);
   return both;
+}
+
+void check_contrast(const SeriesContrast& first, const SeriesContrast& second) {
+  constexpr float clear_share = 0.5F;
+  constexpr std::size_t fewest = 100;
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t n = 0; n < first.usable.size(); ++n) {
+    if (!first.usable[n] || !second.usable[n] || first.fat.contrast[n] < clear_share * first.pure) continue;
+    sum += second.fat.contrast[n];
+    ++count;
+  }
+  if (count < fewest || sum > 0) return;
+  throw InputError(fmt::format(
+      "where the first series shows gland, the second differs from its fat by {:.0f} % to the other side: one "
+      "of the two is to be with fat suppression and one without, as the recipe's `contrast` and `second` say",
+      -100 * sum / static_cast<double>(count)));
 }
 
 }  // namespace supine::segmentation

@@ -19,8 +19,8 @@ struct SecondSeries {
 /// mean over itself.
 /// @param image  the first series
 /// @param under_skin  voxels of the breast that are mostly fat
-/// @throws InputError  a series that shows another body, lies further away, or reaches over less than nine tenths of
-///   the breast
+/// @throws InputError  a series that shows another body, lies further away, reaches over less than nine tenths of
+///   the breast, or has no fat brighter than its noise
 SecondSeries lay_over(const GreyImage& series, const GreyImage& image, const Mask& breast, const Mask& under_skin);
 
 /// What one series says of fat and gland; a voxel with share f of gland has the contrast f times `pure`.
@@ -29,6 +29,11 @@ struct SeriesContrast {
   double pure;
   Mask usable;  ///< where it says anything
 };
+
+/// Of gland that both show.
+/// @throws InputError  a second series that has gland on the other side of fat where the first shows it clearly: of
+///   another kind than was said
+void check_contrast(const SeriesContrast& first, const SeriesContrast& second);
 
 /// The share of gland that two series say together, with its standard deviation, as the contrast of one series whose
 /// pure gland has 1: (Σ c p / s²) / (Σ p² / s²), over those of contrast c, scatter s and pure contrast p that are

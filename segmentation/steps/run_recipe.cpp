@@ -272,8 +272,9 @@ std::string second_words(const GlandResult& result) {
   const GlandResult::Second& second = *result.second;
   return fmt::format(
       "; second series, moved by ({:.1f}, {:.1f}, {:.1f}) mm: fat scatters by {:.0f} %, pure gland differs from it by "
-      "{:.0f} %",
-      second.shift_mm.x(), second.shift_mm.y(), second.shift_mm.z(), 100 * second.fat_sd, 100 * second.pure);
+      "{:.0f} %; in the first fat lies ({:.1f}, {:.1f}, {:.1f}) mm aside",
+      second.shift_mm.x(), second.shift_mm.y(), second.shift_mm.z(), 100 * second.fat_sd, 100 * second.pure,
+      second.fat_shift_mm.x(), second.fat_shift_mm.y(), second.fat_shift_mm.z());
 }
 
 std::string StepRunner::run(const Gland& step) {

@@ -108,6 +108,9 @@ TEST(SecondSeries, OfAnotherBodyOrPlaceIsRefused) {
   EXPECT_NE(said(away).find("bound 10 mm along each axis"), std::string::npos) << said(away);
   const GreyImage half = series(grid_of(56, 56, 26, 2, Vector3d::Zero()), 30, 120, 3, in_place);
   EXPECT_NE(said(half).find("of the breast (bound 90 %)"), std::string::npos) << said(half);
+  GreyImage black = series(b.grid, 0, 120, 0.01, in_place);
+  for (float& grey : black.voxels) grey = grey > 1 ? grey : 0;
+  EXPECT_NE(said(black).find("no brighter than its noise"), std::string::npos) << said(black);
 }
 
 SeriesContrast contrast(float value, float deviation, double pure, bool usable) {
@@ -156,6 +159,15 @@ TEST(FatShift, WhatIsMovedIsReadFromThere) {
   const SeriesContrast there = moved(ramp, grid, Vector3d(3, 0, 0));
   EXPECT_NEAR(there.fat.contrast[grid.index(1, 1, 1)], 2.5, 1e-6);
   EXPECT_FALSE(there.usable[grid.index(5, 1, 1)]) << "beyond the image";
+}
+
+TEST(GlandByTwoSeries, OfOneKindAreRefused) {
+  const Breast b;
+  const GreyImage first = series(b.grid, 100, 40, 3, in_place);
+  GlandOptions options;
+  options.second = GlandOptions::Contrast::bright;
+  const std::string said = testing::message_of([&] { find_gland(first, b.place, options, &first); });
+  EXPECT_NE(said.find("with fat suppression and one without"), std::string::npos) << said;
 }
 
 TEST(GlandByTwoSeries, IsBetterThanByTheNoisierAndLiesWhereTheGlandIs) {
