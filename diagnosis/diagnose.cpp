@@ -119,7 +119,6 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
     result.missing = likely_effects(hypotheses, effects, included, [&](const Inclusion& one) {
       return (!some && !expected) || one.bayes_factor >= settling_factor || is_left_open(priors, one);
     });
-    if (result.missing.empty() && !included.empty()) result.missing = {included.front().effect};
     result.why = denied.empty() ? fmt::format("that nothing is missing has probability {:.2f}", nothing)
                                 : fmt::format("what was left out speaks against {}", fmt::join(denied, ", "));
     if (!likely) result.why += fmt::format(", and this scan could not show {}", fmt::join(undecided, " or "));

@@ -99,6 +99,9 @@ TEST(MeasuredLandmarks, ADoubtIsToldWhereAFactorExplainsWhatIsOff) {
   EXPECT_NE(doubt_of_scale(spread_by(1.3), there).find("3 landmarks are spread 1.30 times"), std::string::npos);
   EXPECT_NE(doubt_of_scale(spread_by(0.75), there).find("spread 0.75 times"), std::string::npos);
   EXPECT_NE(doubt_of_scale(spread_by(1.3), there).find(" 0.0 mm without"), std::string::npos);
+  MeasuredLandmarks scattered = spread_by(1.3);  // a factor explains most of it, not all
+  scattered.measured.col(2) += Eigen::Vector3d(3, -3, 0);
+  EXPECT_NE(doubt_of_scale(scattered, there).find("check their unit"), std::string::npos);
   MeasuredLandmarks vague = spread_by(1.3);
   vague.sigma_mm.setConstant(20);
   EXPECT_EQ(doubt_of_scale(vague, there), "") << "within what the file says of its errors";

@@ -31,6 +31,21 @@ struct Fitted {
   calibration::Fit fit;
 };
 
+TEST(CorrelationLength, IsThatOfAFieldBetweenFiveAndSixtyMillimetres) {
+  const Fitted f;
+  const calibration::Residuals& r = f.fit.residuals;
+  const auto length_of = [&r](double mm) {
+    const Eigen::Vector3d wave = Eigen::Vector3d(1, 0.6, 0.3).normalized();
+    const Eigen::ArrayXd phase = (r.place * wave).array() / mm;
+    return correlation_length_mm(r, (phase.cos() + phase.sin()).matrix());
+  };
+  EXPECT_EQ(correlation_length_mm(r, Eigen::VectorXd::Ones(r.size())), 60);
+  EXPECT_EQ(correlation_length_mm(r, Eigen::VectorXd::Zero(r.size())), 5);
+  EXPECT_LT(length_of(4), length_of(8));
+  EXPECT_LT(length_of(8), length_of(20));
+  EXPECT_NEAR(length_of(8), 20, 10) << "shorter waves are less alike";
+}
+
 TEST(NumericalError, IsWhatTwoOtherMeshesChange) {
   const Fitted f;
   const NumericalError error = measure_numerical_error(f.twin.scene(), twin_truth(), f.fit);

@@ -84,6 +84,17 @@ TEST_F(NullTwin, NothingIsMissingWhereNothingIs) {
   EXPECT_NEAR(sum, 1, 1e-9);
 }
 
+TEST_F(NullTwin, TheLikeliestSetsAreToldInTheirOrderAndNothingAmongThem) {
+  const auto told = found->told();
+  ASSERT_EQ(found->unexplained_by.size(), std::min(Findings::hypotheses_told, found->hypotheses.size()));
+  ASSERT_GE(told.size(), found->unexplained_by.size());
+  for (std::size_t h = 0; h < found->unexplained_by.size(); ++h) {
+    EXPECT_EQ(told[h].first, &found->hypotheses[h]);
+    EXPECT_EQ(told[h].second.mean_mm, found->unexplained_by[h].mean_mm);
+  }
+  EXPECT_TRUE(std::any_of(told.begin(), told.end(), [](const auto& one) { return one.first->effects.empty(); }));
+}
+
 TEST_F(NullTwin, TheBudgetHoldsTheNoiseAndWhatIsUnexplained) {
   EXPECT_NEAR(found->budget.noise, noise_mm, 0.05);
   EXPECT_NEAR(found->budget.total, found->rms_mm, 1e-12);

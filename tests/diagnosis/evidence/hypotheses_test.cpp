@@ -46,6 +46,17 @@ TEST(Hypotheses, WhatWasFollowedAgainSaysNothingOfLines) {
   EXPECT_EQ(list[2].ln_evidence, 4);
 }
 
+TEST(Hypotheses, LinesFromARefitLeadAstrayInTheirOwnWay) {
+  std::vector<Hypothesis> list = {screened({}, 0), screened({0}, 5), screened({1}, 4), screened({0, 2}, 8),
+                                  screened({0, 3}, 7)};
+  list[3].drawn_at = list[4].drawn_at = 0;
+  list[1].ln_evidence = 4, list[1].refitted = true;  // by 1 from the base fit
+  list[3].ln_evidence = 5, list[3].refitted = true;  // by 3 from that refit
+  lower_unfollowed(list);
+  EXPECT_EQ(list[2].ln_evidence, 3);
+  EXPECT_EQ(list[4].ln_evidence, 4);
+}
+
 TEST(Hypotheses, NothingFallsWhereNothingWasFollowed) {
   std::vector<Hypothesis> list = {screened({}, 0), screened({0}, 5)};
   lower_unfollowed(list);

@@ -173,30 +173,33 @@ TEST(ConditionedTargets, HoldTheTruthAsOftenAsTheySay) {
 }
 
 TEST(ConditionedTargets, CutWhatHasNoValuesBelow) {
-  Made made(9);
-  JointMoves& m = made.moves;
-  m.least = VectorXd::Constant(4, -std::numeric_limits<double>::infinity());
-  const ConditionedTargets whole = condition(m);
-  // Half a standard deviation above where it is: most of it is cut.
-  const double sd = std::sqrt(whole.directions_covariance(2, 2)), least = whole.directions_mean[2] + 0.5 * sd;
-  m.least[2] = least;
-  const ConditionedTargets cut = condition(m);
-  std::mt19937 generator(14);
-  std::normal_distribution<double> normal;
-  const VectorXd gain = whole.with_directions.col(2) / (sd * sd);
-  VectorXd mean = VectorXd::Zero(6);
-  double number = 0;
-  constexpr int draws = 20000;
-  for (int kept = 0; kept < draws;) {
-    const double z = whole.directions_mean[2] + sd * normal(generator);
-    if (z < least) continue;
-    ++kept;
-    number += z / draws, mean += (whole.mean + gain * (z - whole.directions_mean[2])) / draws;
+  for (const int z_at : {0, 2, 3}) {
+    Made made(9);
+    JointMoves& m = made.moves;
+    m.least = VectorXd::Constant(4, -std::numeric_limits<double>::infinity());
+    const ConditionedTargets whole = condition(m);
+    // Half a standard deviation above where it is: most of it is cut.
+    const double sd = std::sqrt(whole.directions_covariance(z_at, z_at));
+    const double least = whole.directions_mean[z_at] + 0.5 * sd;
+    m.least[z_at] = least;
+    const ConditionedTargets cut = condition(m);
+    std::mt19937 generator(14);
+    std::normal_distribution<double> normal;
+    const VectorXd gain = whole.with_directions.col(z_at) / (sd * sd);
+    VectorXd mean = VectorXd::Zero(6);
+    double number = 0;
+    constexpr int draws = 20000;
+    for (int kept = 0; kept < draws;) {
+      const double z = whole.directions_mean[z_at] + sd * normal(generator);
+      if (z < least) continue;
+      ++kept;
+      number += z / draws, mean += (whole.mean + gain * (z - whole.directions_mean[z_at])) / draws;
+    }
+    EXPECT_NEAR(cut.directions_mean[z_at], number, 0.02 * sd) << z_at;
+    EXPECT_LT((cut.mean - mean).norm(), 0.02 * sd * gain.norm()) << z_at;
+    EXPECT_LT(cut.directions_covariance(z_at, z_at), 0.3 * sd * sd) << z_at;
+    EXPECT_LT(cut.covariance.trace(), whole.covariance.trace()) << z_at;
   }
-  EXPECT_NEAR(cut.directions_mean[2], number, 0.02 * sd);
-  EXPECT_LT((cut.mean - mean).norm(), 0.02 * sd * gain.norm());
-  EXPECT_LT(cut.directions_covariance(2, 2), 0.3 * sd * sd);
-  EXPECT_LT(cut.covariance.trace(), whole.covariance.trace());
 }
 
 TEST(DistancesExpectedByOthers, CountSetsAsTheOthersHaveThem) {

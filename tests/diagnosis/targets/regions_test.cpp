@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "common/statistics.h"
 #include "diagnosis/targets/draws.h"
+#include "diagnosis/targets/further_scan.h"
+#include "diagnosis/targets/joint_moves.h"
 #include "diagnosis/targets/moves.h"
 #include "diagnosis/targets/places.h"
 #include "diagnosis/weighted_fit.h"
@@ -150,6 +153,50 @@ TEST(TargetRegionsOfATwin, HoldTheTruthAndAreTighterThanWithoutTheScan) {
   EXPECT_TRUE(std::any_of(known.points.begin(), known.points.end(), scan));
 }
 
+TEST(JointMovesOfAPose, ThatWasNotMeasuredHoldWhatIsKnownAndItsOwnNuisancesBehind) {
+  Fitted fitted;
+  const auto nuisances = with_those_of(fitted.base.model, fitted.base.nuisances, "prone", "tilt45", fitted.priors);
+  const auto own = static_cast<Eigen::Index>(nuisances.size() - fitted.base.nuisances.size());
+  ASSERT_GT(own, 0);
+  const JointMoves joint = measured_part(fitted.evaluator, fitted.base, {}, fitted.priors, nuisances).joint;
+  const Eigen::Index all = fitted.base.fit.u.size() + static_cast<Eigen::Index>(nuisances.size());
+  ASSERT_EQ(joint.data.cols(), all);
+  ASSERT_EQ(joint.mean.size(), all);
+  EXPECT_TRUE(joint.data.rightCols(own).isZero(0)) << "they move no measured distance";
+  EXPECT_EQ(
+      joint.data.leftCols(all - own),
+      directions_at(fitted.base.fit, *fitted.base.parameters, fitted.base.nuisances, fitted.base.clusters).columns);
+  EXPECT_EQ(joint.sd.tail(own), Eigen::VectorXd::Ones(own));
+  ASSERT_EQ(joint.sets.size(), 1u);
+  EXPECT_EQ(joint.sets[0].rows.size(), static_cast<std::size_t>(all));
+  EXPECT_EQ(joint.sets[0].rows.back(), all - 1);
+  // Errors are those of the fit, its uneven bodies but for where they are measured once more.
+  const double patches = (fitted.base.patches * fitted.base.patches.transpose()).norm();
+  EXPECT_LT((joint.data_errors - fitted.base.errors).norm(), 0.3 * patches);
+}
+
+TEST(FurtherScanOfATwin, ErrsByScannerAndMeshAlikeWhereItIsClose) {
+  const Asked asked;
+  const simulation::Model model = supine::testing::twin_truth();
+  PoseAt at(asked.twin.mesh, asked.twin.anatomy, asked.twin.prone, asked.twin.supine, model, nullptr);
+  const calibration::FreeParameters free(model);
+  const auto scan = [&](double mesh_share, double shared_mm) {
+    Priors priors;
+    priors.scan_shared_mm = shared_mm;
+    return further_scan(at, asked.twin.mesh, free, free.start(), {}, priors, {}, mesh_share).errors;
+  };
+  const Eigen::MatrixXd noise = scan(0, 0), mesh = scan(0.1, 0) - noise, shared = scan(0, 0.5) - noise;
+  EXPECT_GT(noise.diagonal().minCoeff(), 0);
+  EXPECT_TRUE((noise - Eigen::MatrixXd(noise.diagonal().asDiagonal())).isZero(1e-12)) << "place by place";
+  const double variance = std::pow(0.1 * at.way_mm(), 2);
+  EXPECT_LT((mesh.diagonal().array() / variance - 1).abs().maxCoeff(), 1e-6);
+  EXPECT_LT((shared.diagonal().array() / 0.25 - 1).abs().maxCoeff(), 1e-6);
+  for (const auto& [errors, most] : {std::pair{mesh, variance}, std::pair{shared, 0.25}}) {
+    EXPECT_GT((errors - Eigen::MatrixXd(errors.diagonal().asDiagonal())).maxCoeff(), 0.1 * most);
+    EXPECT_LT(errors.minCoeff(), 0.5 * most) << "less alike far apart";
+  }
+}
+
 /// Whether an ellipsoid holds a point.
 bool holds(const TargetRegion& region, const Eigen::Vector3d& point) {
   return (region.axes.transpose() * (point - region.place_mm)).cwiseQuotient(region.half_axes_mm).norm() <= 1;
@@ -183,8 +230,15 @@ TEST(TargetRegionsOfATwin, HoldTheTruthThatTheModelLacks) {
   for (const Hypothesis& h : known.hypotheses) sum += h.probability;
   EXPECT_NEAR(sum, 1, 1e-9);
   const TargetRegions diagnosed = find_regions(fitted.question, fitted.evaluator, fitted.base, known, fitted.priors);
-  for (int p = 0; p < 4; ++p)
-    EXPECT_TRUE(holds(diagnosed.points[static_cast<std::size_t>(p)], places.row(p).transpose())) << p;
+  int tilts = 0;
+  for (int p = 0; p < 4; ++p) {
+    const TargetRegion& region = diagnosed.points[static_cast<std::size_t>(p)];
+    EXPECT_TRUE(holds(region, places.row(p).transpose())) << p;
+    std::set<std::string> what;  // both angles of a tilt become known together
+    for (const Shrink& shrink : region.shrinks) EXPECT_TRUE(what.insert(shrink.what).second) << shrink.what;
+    tilts += static_cast<int>(what.count("gravity_tilt"));
+  }
+  EXPECT_GT(tilts, 0);
   EXPECT_EQ(weigh_as({{{"left_right_stiffness"}, 0.5}}, fitted.start, known),
             (std::vector<std::string>{"left_right_stiffness"}));
 }
