@@ -113,16 +113,18 @@ Points Evaluator::landmark_derivative(const simulation::Model& model, const Pred
   return moved;
 }
 
+void move_along(const simulation::ChainDerivative& derivative, double step, simulation::ChainSolution& solution) {
+  solution.X += step * derivative.X;
+  solution.prone += step * derivative.prone;
+  for (std::size_t p = 0; p < solution.poses.size(); ++p) solution.poses[p].x += step * derivative.poses[p];
+}
+
 simulation::ChainSolution extrapolated(const simulation::ChainSolution& solution,
                                        const std::vector<simulation::ChainDerivative>& by_coordinate,
                                        const Eigen::VectorXd& step) {
   simulation::ChainSolution moved = solution;
-  for (std::size_t i = 0; i < by_coordinate.size(); ++i) {
-    const double s = step[static_cast<Eigen::Index>(i)];
-    moved.X += s * by_coordinate[i].X;
-    moved.prone += s * by_coordinate[i].prone;
-    for (std::size_t p = 0; p < moved.poses.size(); ++p) moved.poses[p].x += s * by_coordinate[i].poses[p];
-  }
+  for (std::size_t i = 0; i < by_coordinate.size(); ++i)
+    move_along(by_coordinate[i], step[static_cast<Eigen::Index>(i)], moved);
   return moved;
 }
 

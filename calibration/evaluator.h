@@ -92,6 +92,9 @@ class Evaluator {
   std::vector<std::shared_ptr<const simulation::Embedding>> landmarks_;  // by measurement
 };
 
+/// Moves every shape of a solution by a first-order step of a number.
+void move_along(const simulation::ChainDerivative& derivative, double step, simulation::ChainSolution& solution);
+
 /// The solution moved by first-order steps of the parameters: where to start looking for the next one.
 simulation::ChainSolution extrapolated(const simulation::ChainSolution& solution,
                                        const std::vector<simulation::ChainDerivative>& by_coordinate,

@@ -41,6 +41,16 @@ std::vector<Candidate> lacking_effects(const simulation::Model& model, const mes
   return all;
 }
 
+void move_along(const Candidate& candidate, std::size_t k, double step, simulation::ChainSolution& solution) {
+  constexpr double furthest_mm = 5;
+  if (candidate.motion.empty()) return;
+  const simulation::ChainDerivative& motion = *candidate.motion[k];
+  double most = motion.X.rowwise().norm().maxCoeff();
+  for (const Points& x : motion.poses) most = std::max(most, x.rowwise().norm().maxCoeff());
+  const double reach = furthest_mm / std::max(most, 1e-300);
+  calibration::move_along(motion, std::clamp(step, -reach, reach), solution);
+}
+
 std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const simulation::Model& model,
                                        const calibration::Fit& fit, std::vector<std::string>& unseen) {
   const simulation::Sensitivities sensitivities(evaluator.chain(), model, fit.prediction.solution);
@@ -48,11 +58,13 @@ std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const 
   for (const Candidate& lacking : lacking_effects(model, *evaluator.scene().mesh, *evaluator.scene().anatomy)) {
     Candidate candidate{lacking.effect, {}, Eigen::MatrixXd(fit.residuals.size(), 0), {}};
     for (const CandidateParameter& number : lacking.parameters) {
-      const Eigen::VectorXd slope = calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, number.name,
-                                                          sensitivities.of(number.name));
+      auto motion = std::make_shared<const simulation::ChainDerivative>(sensitivities.of(number.name));
+      const Eigen::VectorXd slope =
+          calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, number.name, *motion);
       const double rms = slope.norm() / std::sqrt(static_cast<double>(slope.size()));
       if (!(rms * number.typical > unfelt_mm)) continue;
       candidate.parameters.push_back(number);
+      candidate.motion.push_back(std::move(motion));
       candidate.slope.conservativeResize(Eigen::NoChange, candidate.slope.cols() + 1);
       candidate.slope.col(candidate.slope.cols() - 1) = slope;
     }

@@ -29,7 +29,13 @@ struct Candidate {
   double secant_to = 0;      ///< offset of its number from the null at which the secant was taken; 0: there is none
   std::shared_ptr<const simulation::ChainSolution> secant_at{};  ///< the chain there, where it was kept
   std::shared_ptr<const StandIn> stand_in{};                     ///< where straight lines promise too much of it
+  /// What its parameters do to the shapes at their nulls, per unit; empty where that was not asked.
+  std::vector<std::shared_ptr<const simulation::ChainDerivative>> motion{};
 };
+
+/// Moves the shapes of a solution by a first-order step of parameter @p k, 5 mm at the most: where to look for the
+/// chain with an effect, whose lines may lead far beyond it.
+void move_along(const Candidate& candidate, std::size_t k, double step, simulation::ChainSolution& solution);
 
 /// Every effect of the catalogue that the body can have and the model has not, with all its numbers but those of place
 /// and shape (Parameter::shape), which change nothing at the null. Without slopes.

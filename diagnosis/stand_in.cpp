@@ -67,7 +67,8 @@ class Imitation {
     {
       // Of an effect that the case does not expect it is a figure beside the verdict: worth one solve from nothing.
       const calibration::TrialLimit limit(evaluator.chain(), expected ? base_.dearest : base_.dearest / 3);
-      fit = weigh(evaluator, there, metric_, start_of(there), near(candidate, size));
+      const simulation::ChainSolution start = near(candidate, size);
+      fit = weigh(evaluator, there, metric_, start_of(there), &start);
     }
     if (!expected &&
         left_of(white(fit), metric_.whitening->apply(fit.solution.linearisation.slope)) > lines_agree * along_lines)
@@ -78,10 +79,12 @@ class Imitation {
                                              left, made_up(there, fit.solution.u)});
   }
 
-  /// The shape at that size where a secant was drawn to it, else without the effect.
-  const simulation::ChainSolution* near(const Candidate& candidate, double size) const {
-    return candidate.secant_at && size == candidate.parameters[0].typical ? candidate.secant_at.get()
-                                                                          : &base_.fit.prediction.solution;
+  /// The shape at that size where a secant was drawn to it, else along the line to it.
+  simulation::ChainSolution near(const Candidate& candidate, double size) const {
+    if (candidate.secant_at && size == candidate.parameters[0].typical) return *candidate.secant_at;
+    simulation::ChainSolution moved = base_.fit.prediction.solution;
+    move_along(candidate, 0, size, moved);
+    return moved;
   }
 
   /// The base model with the effect at a size; of one that is expected with the others that are, free.

@@ -157,6 +157,7 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metri
     } catch (const NumericalFailure&) {
       // No equilibrium there, or none that costs as little: a shorter step.
     }
+    if (promised < worth_shortening) return;
     damping = std::max(Damping::after_failure * damping, Damping::least_after_failure);
     if (damping > Damping::given_up) return;
   }

@@ -28,6 +28,10 @@ struct DescentOptions {
   double settled = 0.2;  ///< stop when the next step promises to lower F by less
 };
 
+/// Of F: where creases of the skin make distances rough, a step that promises less than this and does not keep it is
+/// not shortened. What it promises counts in the evidence all the same, and is less than one of its logarithm.
+inline constexpr double worth_shortening = 2;
+
 /// Of all solves whose distances are compared with a scan: hundredths of a micrometre are nothing beside its noise.
 simulation::SolveOptions accurate_enough();
 /// Of solves far away whose distances are taken as they are, to thousandths of a millimetre.

@@ -29,8 +29,8 @@ CurvedDensity::CurvedDensity(std::vector<double> at, std::vector<double> ln, dou
   const double first = at.front(), last = at.back(), width = last - first;
   const double at_first = ln.front(), at_last = ln.back();
   const double most = *std::max_element(ln.begin(), ln.end());
-  const double rises = (ln[1] - ln[0]) / (at[1] - at[0]);
-  const double falls = (ln[ln.size() - 2] - ln.back()) / (at.back() - at[at.size() - 2]);
+  const double rises = std::max(0.0, (ln[1] - ln[0]) / (at[1] - at[0]));
+  const double falls = std::max(0.0, (ln[ln.size() - 2] - ln.back()) / (at.back() - at[at.size() - 2]));
   const boost::math::interpolators::makima<std::vector<double>> curve(std::move(at), std::move(ln));
   const double from = std::max(lower, first - reach(rises, width)), to = std::min(upper, last + reach(falls, width));
   place_ = VectorXd::LinSpaced(fine + 1, from, to);

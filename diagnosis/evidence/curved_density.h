@@ -7,11 +7,12 @@
 namespace supine::diagnosis {
 
 /// A density of one number that is no normal one, known by its logarithm at a few places: between them by Akima's
-/// modified curve through the logarithms, beyond them falling on as it fell last, nothing outside [lower, upper].
+/// modified curve through the logarithms, beyond them falling on as it fell last, level where it rose, nothing outside
+/// [lower, upper].
 class CurvedDensity {
  public:
   /// @param at  ascending, four or more, inside [lower, upper]
-  /// @param ln  of the density there, up to a constant; the outermost may rise only at an end of the range
+  /// @param ln  of the density there, up to a constant
   /// @throws std::invalid_argument  fewer than four places, or not ascending
   CurvedDensity(std::vector<double> at, std::vector<double> ln, double lower, double upper);
 

@@ -218,7 +218,9 @@ void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, 
     try {
       calibration::Evaluator evaluator(scene, model, accurate_enough_far_away());
       const calibration::TrialLimit limit(evaluator.chain(), dearest);
-      calibration::Prediction moved = evaluator.predict(model, &at.fit.prediction.solution);
+      simulation::ChainSolution near = at.fit.prediction.solution;
+      move_along(candidates[c], 0, rest, near);
+      calibration::Prediction moved = evaluator.predict(model, &near);
       const auto there = calibration::residuals_of(scene, moved, at.fit.mask, base.noise_mm);
       candidates[c].secant = (usual / rest) * (there.distance_mm - at.fit.residuals.distance_mm);
       candidates[c].secant_to = rest;

@@ -8,6 +8,7 @@
 #include "common/error.h"
 #include "common/rms.h"
 #include "diagnosis/evidence/base_fit.h"
+#include "diagnosis/weighted_fit.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -63,6 +64,16 @@ void solve_first(calibration::Evaluator& evaluator, const std::vector<std::strin
   const int evaluations = fit.evaluations;
   fit = std::move(best);
   fit.evaluations = evaluations;
+}
+
+/// The shapes that a trial is likely to have, to first order.
+simulation::ChainSolution expected_at(const JointTrial& trial, const calibration::Fit& from,
+                                      const std::vector<Nuisance>& nuisances) {
+  simulation::ChainSolution near =
+      calibration::extrapolated(from.prediction.solution, from.linearisation.by_coordinate, trial.u - from.u);
+  for (std::size_t k = 0; k < nuisances.size(); ++k)
+    move_along(nuisances[k], trial.nuisances[k].value - nuisances[k].value, near);
+  return near;
 }
 
 }  // namespace
@@ -132,8 +143,7 @@ bool JointFitter::improve() {
   for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
     fit_.fit.u = kept.u, fit_.nuisances = now.nuisances;
     const JointTrial trial = stepped(step);
-    const simulation::ChainSolution near =
-        calibration::extrapolated(kept.prediction.solution, kept.linearisation.by_coordinate, trial.u - kept.u);
+    const simulation::ChainSolution near = expected_at(trial, kept, now.nuisances);
     try {
       const calibration::TrialLimit limit(evaluator_.chain(), fit_.dearest);
       predict(trial, &near);
@@ -141,6 +151,7 @@ bool JointFitter::improve() {
     } catch (const NumericalFailure&) {
       // No equilibrium there: a shorter step.
     }
+    if (promised < worth_shortening) break;
   }
   fit_.fit = kept, fit_.model = kept_model, fit_.nuisances = now.nuisances;
   return false;

@@ -77,18 +77,34 @@ Model with_nuisances(Model model, const std::vector<Nuisance>& nuisances, const 
   return model;
 }
 
+void move_along(const Nuisance& nuisance, double step, simulation::ChainSolution& solution) {
+  if (!nuisance.motion || step == 0) return;
+  const double change = step * nuisance.motion_per_sigma;
+  if (nuisance.pose.empty()) return calibration::move_along(*nuisance.motion, change, solution);
+  for (std::size_t p = 0; p < solution.poses.size(); ++p)
+    if (solution.poses[p].name == nuisance.pose) solution.poses[p].x += change * nuisance.motion->poses[p];
+}
+
 void find_shapes(calibration::Evaluator& evaluator, const simulation::Sensitivities& sensitivities, const Model& model,
                  const calibration::Prediction& prediction, const calibration::Residuals& residuals,
                  std::vector<Nuisance>& nuisances) {
-  std::map<std::string, Eigen::VectorXd> slopes;  // of what is another number in each pose, for all poses at once
+  struct Slope {
+    std::shared_ptr<const simulation::ChainDerivative> motion;
+    Eigen::VectorXd distances;
+  };
+  std::map<std::string, Slope> slopes;  // of what is another number in each pose, for all poses at once
   const auto& measurements = evaluator.scene().measurements;
   for (Nuisance& nuisance : nuisances) {
     const bool base = nuisance.effect.empty();
     const std::string name = base ? nuisance.parameter : nuisance.effect + "." + nuisance.parameter;
-    Eigen::VectorXd& slope = slopes[name];
-    if (slope.size() == 0) slope = slope_at(evaluator, model, prediction, residuals, name, sensitivities.of(name));
-    const double unit = base ? simulation::base_setting(model, name).value : 1;
-    nuisance.shape_mm = nuisance.sigma * unit * slope;
+    Slope& slope = slopes[name];
+    if (!slope.motion) {
+      slope.motion = std::make_shared<const simulation::ChainDerivative>(sensitivities.of(name));
+      slope.distances = slope_at(evaluator, model, prediction, residuals, name, *slope.motion);
+    }
+    nuisance.motion = slope.motion;
+    nuisance.motion_per_sigma = nuisance.sigma * (base ? simulation::base_setting(model, name).value : 1);
+    nuisance.shape_mm = nuisance.motion_per_sigma * slope.distances;
     for (Eigen::Index r = 0; r < residuals.size(); ++r)
       if (!nuisance.pose.empty() &&
           measurements[static_cast<std::size_t>(residuals.pose[r])]->pose.name != nuisance.pose)

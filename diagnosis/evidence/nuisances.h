@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,10 @@ struct Nuisance {
   double sigma;              ///< in the parameter's unit; of a base number that of its logarithm
   Eigen::VectorXd shape_mm;  ///< #R, change of the distances by one sigma
   double value = 0;          ///< where the model has it, in sigma
+  /// What its number does to the shapes where the distances' change was found, in all poses at once, and how much of
+  /// the number one sigma is; none before find_shapes().
+  std::shared_ptr<const simulation::ChainDerivative> motion{};
+  double motion_per_sigma = 0;
 
   /// "supine/misregistration.shift_x_mm"; of what is one for all poses "/gland_stiffness.log_ratio".
   std::string name() const { return pose + "/" + (effect.empty() ? "" : effect + ".") + parameter; }
@@ -36,7 +41,10 @@ std::vector<Nuisance> nuisances_of(const simulation::Model& model, const std::ve
 simulation::Model with_nuisances(simulation::Model model, const std::vector<Nuisance>& nuisances,
                                  const std::vector<std::string>& poses);
 
-/// Fills the shapes at a solved model.
+/// Moves the shapes of a solution by a first-order step of a nuisance, in sigma: in its pose, or all.
+void move_along(const Nuisance& nuisance, double step, simulation::ChainSolution& solution);
+
+/// Fills the shapes at a solved model, of distances and body.
 void find_shapes(calibration::Evaluator& evaluator, const simulation::Sensitivities& sensitivities,
                  const simulation::Model& model, const calibration::Prediction& prediction,
                  const calibration::Residuals& residuals, std::vector<Nuisance>& nuisances);

@@ -58,6 +58,24 @@ VectorXd start_of(const FreeParameters& parameters, const JointFit& from, const 
   return parameters.clamped(u);
 }
 
+/// The shapes at such a start: those of the earlier fit, moved by what is new.
+simulation::ChainSolution shapes_at(const VectorXd& start, const FreeParameters& parameters, const JointFit& from,
+                                    const std::vector<Candidate>& candidates, const Hypothesis& screened) {
+  simulation::ChainSolution near = from.fit.prediction.solution;
+  const auto& names = parameters.names();
+  const auto& own = from.parameters->names();
+  for (const int effect : screened.effects) {
+    const Candidate& candidate = candidates[static_cast<std::size_t>(effect)];
+    for (std::size_t k = 0; k < candidate.parameters.size(); ++k) {
+      const CandidateParameter& p = candidate.parameters[k];
+      if (std::find(own.begin(), own.end(), p.name) != own.end()) continue;
+      const Index i = std::find(names.begin(), names.end(), p.name) - names.begin();
+      move_along(candidate, k, parameters.value(i, start[i]) - p.null, near);
+    }
+  }
+  return near;
+}
+
 /// Densities of coordinates that are no normal ones.
 using Curved = std::map<Index, CurvedDensity>;
 
@@ -179,8 +197,9 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
   if (screened.from_usual && fit_afresh(scene, base, h, result.joint)) return result.solved = true;
   if (screened.from_usual) result.joint = unfitted, h = screened;
   try {
-    fit_set(scene, base, start_of(*unfitted.parameters, from, candidates, screened), &from.fit.prediction.solution,
-            result.joint, h);
+    const VectorXd start = start_of(*unfitted.parameters, from, candidates, screened);
+    const simulation::ChainSolution near = shapes_at(start, *unfitted.parameters, from, candidates, screened);
+    fit_set(scene, base, start, &near, result.joint, h);
     result.solved = true;
   } catch (const NumericalFailure&) {
     // No equilibrium where the screening has it.

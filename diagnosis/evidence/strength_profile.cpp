@@ -25,8 +25,18 @@ constexpr double bent = 0.5;      // of what the usual size changes, that the sl
 
 struct Place {
   double u, ln_density;
-  VectorXd others;  ///< coordinates of the other free parameters, where they are likeliest
+  VectorXd others;        ///< coordinates of the other free parameters, where they are likeliest
+  calibration::Fit held;  ///< of them, close to there
 };
+
+/// Shapes on the line through two places, @p share of their distance beyond the last.
+simulation::ChainSolution beyond(const simulation::ChainSolution& before, simulation::ChainSolution last,
+                                 double share) {
+  last.X += share * (last.X - before.X);
+  last.prone += share * (last.prone - before.prone);
+  for (std::size_t p = 0; p < last.poses.size(); ++p) last.poses[p].x += share * (last.poses[p].x - before.poses[p].x);
+  return last;
+}
 
 double ln_normal(double u, const calibration::Prior& prior) {
   const double z = (u - prior.mean) / prior.sd;
@@ -53,7 +63,10 @@ class Walker {
     const Weighed weighed = h.evidence->weigh(rows);
     const double u = refit_.joint.fit.u[k_];
     const VectorXd others = without(refit_.joint.fit.u);
-    return {u, weighed.ln_evidence + ln_normal(u, prior_), others + likeliest(weighed, others.size())};
+    calibration::Fit held;
+    held.u = others;
+    held.prediction.solution = refit_.joint.fit.prediction.solution;
+    return {u, weighed.ln_evidence + ln_normal(u, prior_), others + likeliest(weighed, others.size()), std::move(held)};
   }
 
   /// Places to one side.
@@ -61,19 +74,18 @@ class Walker {
     std::vector<Place> places;
     Place before = from, last = from;
     double most = from.ln_density;
-    simulation::ChainSolution near = refit_.joint.fit.prediction.solution;
     for (int count = 0; count < most_per_side && last.ln_density > most - fallen; ++count) {
       const double u = std::clamp(last.u + step, parameters_.lower()[k_], parameters_.upper()[k_]);
       if (std::abs(u - last.u) < 0.1 * std::abs(step)) break;  // the end of the range
       try {
         const VectorXd others = count == 0 ? last.others : VectorXd(2 * last.others - before.others);
-        const Place next = place(u, others, near);
-        before = last, last = next;
+        Place next = place(u, others, count == 0 ? from_refit(u, others) : from_two(before, last, u, others));
+        before = std::move(last), last = std::move(next);
       } catch (const NumericalFailure&) {
         break;  // a body that cannot be
       }
       most = std::max(most, last.ln_density);
-      places.push_back(last);
+      places.push_back({last.u, last.ln_density, last.others, {}});
     }
     return places;
   }
@@ -87,8 +99,24 @@ class Walker {
     return others;
   }
 
-  /// @param near  in: a solution to start from; out: the one here
-  Place place(double u, const VectorXd& others, simulation::ChainSolution& near) const {
+  /// Shapes to start from, along the slopes of the refit.
+  simulation::ChainSolution from_refit(double u, const VectorXd& others) const {
+    const calibration::Fit& fit = refit_.joint.fit;
+    VectorXd step(fit.u.size());
+    step << others.head(k_), u, others.tail(others.size() - k_);
+    return calibration::extrapolated(fit.prediction.solution, fit.linearisation.by_coordinate, step - fit.u);
+  }
+
+  /// The same through two places, and from there along the slopes of the last.
+  static simulation::ChainSolution from_two(const Place& before, const Place& last, double u, const VectorXd& others) {
+    const double share = (u - last.u) / (last.u - before.u);
+    const VectorXd there = last.held.u + share * (last.held.u - before.held.u);
+    return calibration::extrapolated(beyond(before.held.prediction.solution, last.held.prediction.solution, share),
+                                     last.held.linearisation.by_coordinate, others - there);
+  }
+
+  /// @param near  shapes to start from
+  Place place(double u, const VectorXd& others, const simulation::ChainSolution& near) const {
     simulation::Model model = parameters_.base();
     simulation::Setting& setting = *simulation::find_setting(model, parameters_.names()[index()]);
     setting.value = parameters_.value(k_, u);
@@ -97,13 +125,13 @@ class Walker {
     calibration::Evaluator evaluator(ground_.scene, rest.base(), accurate_enough());
     WeightedFit fit = weigh(evaluator, rest, ground_.metric, rest.clamped(others), &near);
     descend(evaluator, rest, ground_.metric, {.max_iterations = 2, .settled = 0.5}, fit);
-    near = fit.solution.prediction.solution;
     const LinearEvidence evidence(*ground_.base.covariance, ground_.base.distances(fit.solution.residuals),
                                   directions_at(fit.solution, rest, ground_.nuisances, ground_.base.clusters));
     std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
     std::iota(all.begin(), all.end(), 0);
     const Weighed weighed = evidence.weigh(all);
-    return {u, weighed.ln_evidence + ln_normal(u, prior_), fit.solution.u + likeliest(weighed, others.size())};
+    const VectorXd there = fit.solution.u + likeliest(weighed, others.size());
+    return {u, weighed.ln_evidence + ln_normal(u, prior_), there, std::move(fit.solution)};
   }
 
   const RefitGround& ground_;

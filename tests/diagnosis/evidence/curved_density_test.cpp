@@ -48,6 +48,15 @@ TEST(CurvedDensity, NothingLiesBeyondTheRange) {
   EXPECT_NEAR(density.quantile(0.999), 3.5, 0.01);
 }
 
+TEST(CurvedDensity, DoesNotRiseBeyondItsPlaces) {
+  const auto rising = sampled([](double u) { return 10 * u; }, {0, 1, 2, 3}, -1, 8);
+  EXPECT_LT(rising.ln_mass(), 30 + std::log(8 - 3 + 1));
+  EXPECT_GT(rising.quantile(0.5), 3);
+  const auto falling = sampled([](double u) { return -10 * u; }, {0, 1, 2, 3}, -5, 4);
+  EXPECT_LT(falling.ln_mass(), std::log(5 + 1));
+  EXPECT_LT(falling.quantile(0.5), 0);
+}
+
 TEST(CurvedDensity, FewerThanFourPlacesOrDisorderAreRefused) {
   EXPECT_THROW(CurvedDensity({0, 1, 2}, {0, 0, 0}, 0, 2), std::invalid_argument);
   EXPECT_THROW(CurvedDensity({0, 1, 1, 2}, {0, 0, 0, 0}, 0, 2), std::invalid_argument);
