@@ -18,15 +18,24 @@ using calibration::FreeParameters;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double stride = 1.5;    // standard deviations between two places
-constexpr double fallen = 4;      // of ln, from the highest: no further place
-constexpr int most_per_side = 4;  // places
-constexpr double bent = 0.5;      // of what the usual size changes, that the slope does not say
+constexpr double stride = 1.5;       // standard deviations between two places
+constexpr double fallen = 4;         // of ln, from the highest: no further place
+constexpr int most_per_side = 5;     // places
+constexpr double most_of_prior = 4;  // standard deviations
+constexpr double bent = 0.5;         // of what the usual size changes, that the slope does not say
 
 struct Place {
   double u, ln_density;
   VectorXd others;        ///< coordinates of the other free parameters, where they are likeliest
   calibration::Fit held;  ///< of them, close to there
+};
+
+/// How a walk to one side ended.
+enum class End { fell, range, no_body, open };
+
+struct Side {
+  std::vector<Place> places;  ///< the nearest first; without what is held there
+  End end = End::open;
 };
 
 /// Shapes on the line through two places, @p share of their distance beyond the last.
@@ -70,27 +79,46 @@ class Walker {
   }
 
   /// Places to one side.
-  std::vector<Place> walk(const Place& from, double step) const {
-    std::vector<Place> places;
+  Side walk(const Place& from, double step) const {
+    Side side;
     Place before = from, last = from;
     double most = from.ln_density;
-    for (int count = 0; count < most_per_side && last.ln_density > most - fallen; ++count) {
+    for (int count = 0; count < most_per_side; ++count) {
       const double u = std::clamp(last.u + step, parameters_.lower()[k_], parameters_.upper()[k_]);
-      if (std::abs(u - last.u) < 0.1 * std::abs(step)) break;  // the end of the range
+      if (std::abs(u - last.u) < 0.1 * std::abs(step)) return ended(End::range, side);
       try {
         const VectorXd others = count == 0 ? last.others : VectorXd(2 * last.others - before.others);
         Place next = place(u, others, count == 0 ? from_refit(u, others) : from_two(before, last, u, others));
         before = std::move(last), last = std::move(next);
       } catch (const NumericalFailure&) {
-        break;  // a body that cannot be
+        return ended(End::no_body, side);
       }
       most = std::max(most, last.ln_density);
-      places.push_back({last.u, last.ln_density, last.others, {}});
+      side.places.push_back({last.u, last.ln_density, {}, {}});
+      if (last.ln_density <= most - fallen) return ended(End::fell, side);
     }
-    return places;
+    go_on_level(step, side);
+    return side;
   }
 
  private:
+  static Side ended(End end, Side& side) {
+    side.end = end;
+    return std::move(side);
+  }
+
+  /// Places beyond the last as if the measurement said no more there: the prior alone ends the density.
+  void go_on_level(double step, Side& side) const {
+    const double to = step < 0 ? parameters_.lower()[k_] : parameters_.upper()[k_];
+    const double stride_of_prior = std::copysign(std::max(std::abs(step), 0.5 * prior_.sd), step);
+    const Place last = side.places.back();
+    const double evidence = last.ln_density - ln_normal(last.u, prior_);
+    for (double u = last.u + stride_of_prior; (to - u) * step > 0; u += stride_of_prior) {
+      side.places.push_back({u, evidence + ln_normal(u, prior_), {}, {}});
+      if (std::abs(u - prior_.mean) > most_of_prior * prior_.sd && (u - prior_.mean) * step > 0) return;
+    }
+  }
+
   std::size_t index() const { return static_cast<std::size_t>(k_); }
 
   VectorXd without(const VectorXd& u) const {
@@ -154,7 +182,7 @@ std::optional<CurvedDensity> strength_profile(const RefitGround& ground, const R
   const double sd = refit.hypothesis.weighed.number(k).second;
   const Walker walker(ground, refit, parameters, k);
   const Place middle = walker.start();
-  std::array<std::vector<Place>, 2> sides;
+  std::array<Side, 2> sides;
   FirstFailure failure;
 #pragma omp parallel for schedule(static, 1)
   for (std::size_t side = 0; side < 2; ++side)
@@ -162,11 +190,13 @@ std::optional<CurvedDensity> strength_profile(const RefitGround& ground, const R
   failure.rethrow();
   std::vector<double> at, ln;
   const auto add = [&](const Place& place) { at.push_back(place.u), ln.push_back(place.ln_density); };
-  std::for_each(sides[0].rbegin(), sides[0].rend(), add);
+  std::for_each(sides[0].places.rbegin(), sides[0].places.rend(), add);
   add(middle);
-  std::for_each(sides[1].begin(), sides[1].end(), add);
+  std::for_each(sides[1].places.begin(), sides[1].places.end(), add);
   if (at.size() < 4) return std::nullopt;
-  return CurvedDensity(std::move(at), std::move(ln), parameters.lower()[k], parameters.upper()[k]);
+  const double lower = sides[0].end == End::no_body ? at.front() : parameters.lower()[k];
+  const double upper = sides[1].end == End::no_body ? at.back() : parameters.upper()[k];
+  return CurvedDensity(std::move(at), std::move(ln), lower, upper);
 }
 
 }  // namespace supine::diagnosis

@@ -23,9 +23,9 @@ struct RefitGround {
 };
 
 /// Posterior density of one strength, in its coordinate, evidence included: the strength is held at places 1.5 standard
-/// deviations apart until the density has fallen to a fiftieth, everything else is fitted there through the chain and
-/// integrated by Laplace's formula (Tierney and Kadane 1986, marginal
-/// densities).
+/// deviations apart until the density has fallen to a fiftieth, five to each side at the most; everything else is
+/// fitted there through the chain and integrated by Laplace's formula (Tierney and Kadane 1986, marginal densities).
+/// Beyond five places the measurement says no more (the prior goes on); beyond one without equilibrium nothing lies.
 /// Its mass stands in place of the evidence that Laplace's formula gives at the optimum alone.
 /// @param parameters  the refit's, nuisances at their values in their base
 /// @param k           one of their coordinates, which has a prior

@@ -263,6 +263,8 @@ TEST(TwinDiagnosis, LinesFromItsUsualSizeShowMoreOfALigamentThanLinesFromNothing
   ASSERT_TRUE(followed.solved);
   EXPECT_LT(std::abs(after.ln_evidence - followed.hypothesis.ln_evidence),
             0.5 * std::abs(before.ln_evidence - followed.hypothesis.ln_evidence));
+  // Laplace's formula and the curve of the strength tell of one body: no end of the curve makes evidence of its own.
+  EXPECT_NEAR(followed.hypothesis.ln_evidence, followed.hypothesis.weighed.ln_evidence, 5);
 }
 
 TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
