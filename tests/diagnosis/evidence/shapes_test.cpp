@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -58,6 +59,52 @@ TEST(Nuisances, ShapesAreTheSlopesOfTheModelThatCarriesThem) {
     EXPECT_GT(slope.norm(), 1e-3) << name;
     EXPECT_LT((slope - of->shape_mm).norm(), 0.02 * slope.norm()) << name;
   }
+}
+
+TEST(Nuisances, MoveTheBodyAsTheModelThatCarriesThemIsMoved) {
+  Solved solved;
+  const std::vector<std::string> poses = {"prone", "supine"};
+  std::vector<Nuisance> all = nuisances_of(solved.model, poses, {});
+  find_shapes(solved.evaluator, solved.sensitivities, solved.model, solved.prediction, solved.residuals, all);
+  for (const char* name : {"supine/gravity_tilt.roll_rad", "supine/chest_wall_motion.amplitude_mm",
+                           "/segmentation_offset.offset_mm", "/interface.normal_kpa_per_mm"}) {
+    std::vector<Nuisance> moved = all;
+    const auto of = std::find_if(moved.begin(), moved.end(), [name](const Nuisance& n) { return n.name() == name; });
+    ASSERT_NE(of, moved.end()) << name;
+    of->value = 0.05;
+    const simulation::ChainSolution there =
+        solved.evaluator.predict(with_nuisances(solved.model, moved, poses), &solved.prediction.solution).solution;
+    simulation::ChainSolution expected = solved.prediction.solution;
+    move_along(*of, of->value, expected);
+    const Points way = there.poses[0].x - solved.prediction.solution.poses[0].x;
+    EXPECT_GT(way.norm(), 1e-3) << name;
+    EXPECT_LT((there.poses[0].x - expected.poses[0].x).norm(), 0.05 * way.norm()) << name;
+    EXPECT_LT((there.X - expected.X).norm(), 0.05 * way.norm()) << name;
+    EXPECT_LT((there.prone - expected.prone).norm(), 0.05 * way.norm()) << name;
+  }
+}
+
+TEST(Candidates, MoveTheBodyByFiveMillimetresAtTheMost) {
+  Solved solved;
+  std::vector<std::string> unseen;
+  calibration::Fit fit;
+  fit.prediction = solved.prediction;
+  fit.residuals = solved.residuals;
+  const std::vector<Candidate> candidates = find_candidates(solved.evaluator, solved.model, fit, unseen);
+  const auto tilt =
+      std::find_if(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.effect == "gravity_tilt"; });
+  ASSERT_NE(tilt, candidates.end());
+  const auto most = [&](double step) {
+    simulation::ChainSolution moved = solved.prediction.solution;
+    move_along(*tilt, 0, step, moved);
+    return std::max((moved.poses[0].x - solved.prediction.solution.poses[0].x).rowwise().norm().maxCoeff(),
+                    (moved.X - solved.prediction.solution.X).rowwise().norm().maxCoeff());
+  };
+  const double little = most(1e-3);
+  EXPECT_GT(little, 0);
+  EXPECT_NEAR(most(2e-3), 2 * little, 1e-6 * little);
+  EXPECT_NEAR(most(1e3), 5, 1e-6);
+  EXPECT_NEAR(most(-1e3), 5, 1e-6);
 }
 
 TEST(Nuisances, AreAsWideInAPoseAsWasSaidOfIt) {
