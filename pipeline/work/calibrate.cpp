@@ -182,21 +182,27 @@ class Calibration {
     if (!options.use_priors) priors.setZero();
     result.held_out_blocks = calibration::figures_of(as_list(calibration::held_out_distances(
         residuals, fit.linearisation.slope, priors, calibration::spatial_blocks(residuals))));
-    if (measured_.held_out.empty()) return;
+    for (std::size_t m = 0; m < measured_.held_out.size(); ++m) hold_out_pose(m, result);
+  }
+
+  /// The pose predicted by the fit; without figures, and told, where these moduli carry no body in it.
+  void hold_out_pose(std::size_t m, CalibrationResult& result) const {
+    const calibration::Measurement& held_out = measured_.held_out[m];
     calibration::MeasuredScene scene = measured_.fitted_scene();
-    scene.measurements.clear();
-    for (const calibration::Measurement& held_out : measured_.held_out) scene.measurements.push_back(&held_out);
+    scene.measurements = {&held_out};
     const simulation::Model model = parameters_.model(result.fit.u);
     Evaluator other(scene, model);
     simulation::ChainSolution near = result.fit.prediction.solution;
-    near.poses.assign(measured_.start.poses.begin() + static_cast<std::ptrdiff_t>(measured_.fitted.size()),
-                      measured_.start.poses.end());
-    const calibration::Prediction prediction = other.predict(model, &near);
-    for (std::size_t m = 0; m < scene.measurements.size(); ++m) {
-      calibration::Prediction one;
-      one.poses.push_back(prediction.poses[m]);
+    near.poses = {measured_.start.poses[measured_.fitted.size() + m]};
+    try {
+      const calibration::Prediction prediction = other.predict(model, &near);
       result.held_out_poses.push_back(
-          {scene.measurements[m]->pose.name, one.mae_study_mm(), calibration::figures_of(one.scan_distances())});
+          {held_out.pose.name, prediction.mae_study_mm(), calibration::figures_of(prediction.scan_distances())});
+    } catch (const NumericalFailure& why) {
+      run_.warn(
+          fmt::format("no figures of the held-out pose {}: the fitted model has no equilibrium there ({}). Fit it "
+                      "as well ([calibration] poses), or the places of the scans with the moduli (--method joint)",
+                      held_out.pose.name, why.what()));
     }
   }
 
