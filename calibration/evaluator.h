@@ -92,7 +92,7 @@ class Evaluator {
   std::vector<std::shared_ptr<const simulation::Embedding>> landmarks_;  // by measurement
 };
 
-/// Moves every shape of a solution by a first-order step of a number.
+/// Moves every shape of a solution by a first-order step of a number, in its unit.
 void move_along(const simulation::ChainDerivative& derivative, double step, simulation::ChainSolution& solution);
 
 /// The solution moved by first-order steps of the parameters: where to start looking for the next one.

@@ -33,8 +33,8 @@ struct Candidate {
   std::vector<std::shared_ptr<const simulation::ChainDerivative>> motion{};
 };
 
-/// Moves the shapes of a solution by a first-order step of parameter @p k, 5 mm at the most: where to look for the
-/// chain with an effect, whose lines may lead far beyond it.
+/// Moves the shapes of a solution by a first-order step of parameter @p k, in its unit, 5 mm at the most: where to look
+/// for the chain with an effect, whose lines may lead far beyond it.
 void move_along(const Candidate& candidate, std::size_t k, double step, simulation::ChainSolution& solution);
 
 /// Every effect of the catalogue that the body can have and the model has not, with all its numbers but those of place

@@ -18,11 +18,10 @@ using calibration::FreeParameters;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double stride = 1.5;       // standard deviations between two places
-constexpr double fallen = 4;         // of ln, from the highest: no further place
-constexpr int most_per_side = 5;     // places
-constexpr double most_of_prior = 4;  // standard deviations
-constexpr double bent = 0.5;         // of what the usual size changes, that the slope does not say
+constexpr double stride = 1.5;    // standard deviations between two places
+constexpr double fallen = 4;      // of ln, from the highest: no further place
+constexpr int most_per_side = 5;  // places
+constexpr double bent = 0.5;      // of what the usual size changes, that the slope does not say
 
 struct Place {
   double u, ln_density;
@@ -97,7 +96,9 @@ class Walker {
       side.places.push_back({last.u, last.ln_density, {}, {}});
       if (last.ln_density <= most - fallen) return ended(End::fell, side);
     }
-    go_on_level(step, side);
+    const double bound = step < 0 ? parameters_.lower()[k_] : parameters_.upper()[k_];
+    for (const auto& [u, ln] : prior_alone(last.u, last.ln_density, step, bound, prior_))
+      side.places.push_back({u, ln, {}, {}});
     return side;
   }
 
@@ -105,18 +106,6 @@ class Walker {
   static Side ended(End end, Side& side) {
     side.end = end;
     return std::move(side);
-  }
-
-  /// Places beyond the last as if the measurement said no more there: the prior alone ends the density.
-  void go_on_level(double step, Side& side) const {
-    const double to = step < 0 ? parameters_.lower()[k_] : parameters_.upper()[k_];
-    const double stride_of_prior = std::copysign(std::max(std::abs(step), 0.5 * prior_.sd), step);
-    const Place last = side.places.back();
-    const double evidence = last.ln_density - ln_normal(last.u, prior_);
-    for (double u = last.u + stride_of_prior; (to - u) * step > 0; u += stride_of_prior) {
-      side.places.push_back({u, evidence + ln_normal(u, prior_), {}, {}});
-      if (std::abs(u - prior_.mean) > most_of_prior * prior_.sd && (u - prior_.mean) * step > 0) return;
-    }
   }
 
   std::size_t index() const { return static_cast<std::size_t>(k_); }
@@ -175,6 +164,18 @@ bool is_far_from_linear(const Candidate& candidate) {
   if (candidate.secant.size() == 0) return false;
   const VectorXd promised = candidate.parameters[0].typical * candidate.slope.col(0);
   return (promised - candidate.secant).norm() > bent * candidate.secant.norm();
+}
+
+std::vector<std::pair<double, double>> prior_alone(double last, double ln_density, double step, double bound,
+                                                   const calibration::Prior& prior) {
+  constexpr double furthest = 4, least = 0.5;  // standard deviations of the prior
+  const double along = std::copysign(std::max(std::abs(step), least * prior.sd), step);
+  std::vector<std::pair<double, double>> places;
+  for (double u = last + along; (bound - u) * step > 0; u += along) {
+    places.emplace_back(u, ln_density + ln_normal(u, prior) - ln_normal(last, prior));
+    if ((u - prior.mean) * std::copysign(1.0, step) > furthest * prior.sd) break;
+  }
+  return places;
 }
 
 std::optional<CurvedDensity> strength_profile(const RefitGround& ground, const Refit& refit,

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "diagnosis/candidates.h"
 #include "diagnosis/evidence/curved_density.h"
@@ -21,6 +23,15 @@ struct RefitGround {
   const Metric& metric;
   const std::vector<Nuisance>& nuisances;
 };
+
+/// Places beyond the last that was followed, as if the measurement said no more there: ln of the density goes on as the
+/// prior's, in strides of half its standard deviation or more, to four of these beyond its mean.
+/// @param last, ln_density  the last place, a coordinate, and ln of the density there
+/// @param step              sign: the side; size: the stride so far, in coordinates
+/// @param bound             end of the range on that side, left out
+/// @return                  coordinates and ln of the density, the nearest first
+std::vector<std::pair<double, double>> prior_alone(double last, double ln_density, double step, double bound,
+                                                   const calibration::Prior& prior);
 
 /// Posterior density of one strength, in its coordinate, evidence included: the strength is held at places 1.5 standard
 /// deviations apart until the density has fallen to a fiftieth, five to each side at the most; everything else is

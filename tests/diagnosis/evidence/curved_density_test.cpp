@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "common/statistics.h"
+#include "diagnosis/evidence/strength_profile.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -55,6 +56,22 @@ TEST(CurvedDensity, DoesNotRiseBeyondItsPlaces) {
   const auto falling = sampled([](double u) { return -10 * u; }, {0, 1, 2, 3}, -5, 4);
   EXPECT_LT(falling.ln_mass(), std::log(5 + 1));
   EXPECT_LT(falling.quantile(0.5), 0);
+}
+
+TEST(PriorAlone, GoesOnFromTheLastPlaceAsThePriorDoesAndNoFurtherThanTheRange) {
+  const calibration::Prior prior{1, 2};  // mean, standard deviation
+  for (const double side : {1.0, -1.0}) {
+    const double last = prior.mean + 0.5 * side, bound = prior.mean + 100 * side;
+    const auto places = prior_alone(last, 7, 0.1 * side, bound, prior);
+    ASSERT_GT(places.size(), 4u);
+    for (const auto& [u, ln] : places) {
+      const double z = (u - prior.mean) / prior.sd, from = 0.5 / prior.sd;
+      EXPECT_NEAR(ln, 7 - 0.5 * (z * z - from * from), 1e-12);
+    }
+    EXPECT_NEAR(places[0].first - last, side, 1e-12) << "half a standard deviation";
+    EXPECT_NEAR(places.back().first, prior.mean + 8.5 * side, 1e-12) << "beyond four of them";
+    EXPECT_EQ(prior_alone(last, 7, 0.1 * side, last + 2.5 * side, prior).size(), 2u) << "inside the range";
+  }
 }
 
 TEST(CurvedDensity, FewerThanFourPlacesOrDisorderAreRefused) {
