@@ -12,7 +12,7 @@ figures() { jq -r '[.rms_mm, .held_out_rms_mm, .held_out.by_pose[0].rms_mm] | ma
 for case in "${cases[@]}"; do
   mesh=$(mesh_of "$case" $default_triangles)
   fit=$work/$case/fit
-  [ -f "$fit/calibration.json" ] || tool calibrate "$data/$case" "$mesh" --threads 1 -o "$fit"
+  [ -f "$fit/calibration.json" ] || tool calibrate "$data/$case" "$mesh" --method least-squares --threads 1 -o "$fit"
   tool diagnose "$data/$case" "$mesh" --model "$fit/model.toml" -o "$fit"
   verdict=$(jq -r .verdict "$fit/diagnosis.json")
   named=$(jq -r '.missing | join(", ")' "$fit/diagnosis.json")
@@ -26,7 +26,7 @@ for case in "${cases[@]}"; do
     chmod u+w "$next/start.toml"
     best=$(jq -r '.missing as $named | [.candidates[] | select(.effect as $e | $named | index($e))][0].effect' "$fit/diagnosis.json")
     tool model add "$best" "$next/start.toml"
-    tool calibrate "$data/$case" "$mesh" --model "$next/start.toml" --threads 1 -o "$next"
+    tool calibrate "$data/$case" "$mesh" --method least-squares --model "$next/start.toml" --threads 1 -o "$next"
     read -r rms2 blocks2 tilt2 < <(figures "$next")
   fi
   echo "| $case | $verdict | $named | $best | $rms | $rms2 | $blocks | $blocks2 | $tilt | $tilt2 | $noise |"

@@ -11,7 +11,7 @@ for answer in "$data"/answers/*.json; do
   case=$(basename "$answer" .json)
   fit=$work/$case/fit
   mesh=$(mesh_of "$case" $default_triangles)
-  [ -f "$fit/calibration.json" ] || tool calibrate "$data/$case" "$mesh" --threads 1 -o "$fit"
+  [ -f "$fit/calibration.json" ] || tool calibrate "$data/$case" "$mesh" --method least-squares --threads 1 -o "$fit"
   jq -r --slurpfile truth "$answer" --arg case "$case" '
     def r3: . * 1000 | round / 1000; def r2: . * 100 | round / 100; def r1: . * 10 | round / 10;
     "| " + ([$case, (.parameters[0].value | r3), "\(.parameters[0].interval95[0] | r3) to \(.parameters[0].interval95[1] | r3)",

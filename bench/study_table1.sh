@@ -54,7 +54,7 @@ for kind in null own; do
     base=$work/table1/$kind-$eb-$sb
     mkdir -p "$base"
     with_moduli "$folder/model.toml" "$base/start.toml" "$eb" "$sb" "$es" "$ss"
-    if ! calibrated "$base/ls" "$folder" "$mesh" --model "$base/start.toml" --no-priors; then
+    if ! calibrated "$base/ls" "$folder" "$mesh" --method least-squares --model "$base/start.toml" --no-priors; then
       echo "| $kind | $name | | | no equilibrium at the start | | | | | |"
       continue
     fi

@@ -8,6 +8,10 @@
 
 namespace supine::calibration {
 
+/// What points of a scan are taken to err at least, 1 sigma: a smoothed scan shows no noise, and then facets and
+/// creases of the mesh would count for what they are not.
+inline constexpr double least_noise_mm = 0.25;
+
 /// Scanner noise along the normal, 1 sigma, from what the signed distances do between neighbouring points: each of up
 /// to 3000 points against the plane through the distances of its 16 neighbours, median absolute deviation. What
 /// varies over more than a few points (the model's error) cancels; so does noise that neighbouring points share,

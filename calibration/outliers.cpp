@@ -9,7 +9,6 @@
 namespace supine::calibration {
 
 Outliers find_outliers(const Points& place, const SignedDistances& distances, double given_noise_mm) {
-  constexpr double least_noise_mm = 0.25;  // a smoothed scan has none, and then every crease would stand out
   Outliers found;
   std::vector<int> over;
   for (int i = 0; i < place.rows(); ++i)

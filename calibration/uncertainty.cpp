@@ -34,6 +34,13 @@ Uncertainty::Information points_information(const Fit& fit, const ErrorModel& er
   return {precision * (j.transpose() * j), precision * precision * weighted_product(errors, fit.residuals, j, j)};
 }
 
+/// JᵀN/τ².
+Eigen::MatrixXd never_known_pull(const Fit& fit, const Eigen::MatrixXd& never_known) {
+  const Eigen::MatrixXd& j = fit.linearisation.slope;
+  if (never_known.cols() == 0) return Eigen::MatrixXd::Zero(j.cols(), 0);
+  return j.transpose() * never_known / mean_square(fit.residuals.distance_mm);
+}
+
 /// Of priors and of a user's own residuals, which are normal about what was measured, as priors are.
 Eigen::MatrixXd prior_matrix(const Fit& fit, const FreeParameters& parameters, bool use_priors) {
   Eigen::MatrixXd priors = Eigen::MatrixXd::Zero(parameters.size(), parameters.size());
@@ -67,15 +74,20 @@ std::vector<Uncertainty::Pair> twins(const Eigen::MatrixXd& covariance, const Fr
 
 }  // namespace
 
-Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_priors) {
+Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_priors,
+                  const Eigen::MatrixXd& never_known) {
   const Eigen::MatrixXd& j = fit.linearisation.slope;
   const double tau = rms(fit.residuals.distance_mm);
   Uncertainty result;
   result.errors = fit_error_model(fit.residuals, j);
   result.effective_points = result.errors.effective_count(fit.residuals);
-  const auto& [data, spread] = result.points = points_information(fit, result.errors);
+  result.points = points_information(fit, result.errors);
+  const Eigen::MatrixXd pull = never_known_pull(fit, never_known);
+  result.points.spread += pull * pull.transpose();
+  const auto& [data, spread] = result.points;
   const Eigen::MatrixXd priors = prior_matrix(fit, parameters, use_priors);
   const Closed closed(data + priors);
+  result.never_known = -closed.inverse * pull;
   result.white = closed.inverse;
   result.covariance = closed.sandwich(spread + priors);
   result.singular = Eigen::JacobiSVD<Eigen::MatrixXd>(j / tau).singularValues();

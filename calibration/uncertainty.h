@@ -15,11 +15,12 @@ namespace supine::calibration {
 /// What a fit is worth, linearised at its optimum.
 struct Uncertainty {
   ErrorModel errors;
-  double effective_points;     ///< independent points the scan is worth under `errors`
-  Eigen::MatrixXd covariance;  ///< of the coordinates u, under correlated errors (sandwich)
-  Eigen::MatrixXd white;       ///< the same if every point erred by itself with the residuals' rms: too small
-  Eigen::VectorXd singular;    ///< of the slopes over the residuals' rms, descending: 1 / sd of each direction
-  /// JᵀJ/τ² and JᵀΣJ/τ⁴ of judge().
+  double effective_points;      ///< independent points the scan is worth under `errors`
+  Eigen::MatrixXd covariance;   ///< of the coordinates u, under correlated errors (sandwich)
+  Eigen::MatrixXd never_known;  ///< #u by #K, how far the answer goes when one sigma of a number of judge() holds
+  Eigen::MatrixXd white;        ///< the same if every point erred by itself with the residuals' rms: too small
+  Eigen::VectorXd singular;     ///< of the slopes over the residuals' rms, descending: 1 / sd of each direction
+  /// JᵀJ/τ² and Jᵀ(Σ + N Nᵀ)J/τ⁴ of judge().
   struct Information {
     Eigen::MatrixXd data, spread;
   };
@@ -33,10 +34,13 @@ struct Uncertainty {
   std::vector<Pair> not_told_apart;
 };
 
-/// With H = JᵀJ/τ² + P the information of points (rms τ) and priors, and V = JᵀΣJ/τ⁴ + P its true variance:
+/// With H = JᵀJ/τ² + P the information of points (rms τ) and priors, and V = Jᵀ(Σ + N Nᵀ)J/τ⁴ + P its true variance:
 /// covariance = H⁻¹ V H⁻¹ (Huber, White). Directions the data leave open and no prior closes get a standard deviation
 /// of 1e3 coordinates.
-Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_priors);
+/// @param never_known  N, #R by #K mm: what one sigma of each number that is never known and was not fitted does to the
+///                     distances, each by itself; without a column the points' own errors are all there is
+Uncertainty judge(const Fit& fit, const FreeParameters& parameters, bool use_priors,
+                  const Eigen::MatrixXd& never_known = {});
 
 /// What the measurements alone say of each coordinate: its own prior taken out of the estimate and of the spread, those
 /// of the others kept. The estimate moves to where the minimised cost lies without that prior, to first order and

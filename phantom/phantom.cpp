@@ -7,6 +7,7 @@
 #include "meshing/topology.h"
 #include "phantom/cause_prior.h"
 #include "phantom/causes/cause_kind.h"
+#include "phantom/solve_volunteer.h"
 #include "phantom/voxels.h"
 
 namespace supine::phantom {
@@ -14,9 +15,6 @@ namespace {
 
 constexpr int stiffer_tries = 6;
 constexpr double stiffer = 1.15;
-// Volunteers' breasts: raised until they are carried, then followed down to the moduli drawn.
-constexpr int much_stiffer_tries = 4;
-constexpr double much_stiffer = 1.5, softer = 1.1;
 constexpr double landmark_sigma_mm = 1.5;  // of a landmark found again in a scan
 
 std::vector<Cause> draw_causes(const PhantomOptions& options) {
@@ -59,47 +57,9 @@ void solve_stiffening(const BodyMesh& body_mesh, const PhantomOptions& options, 
   }
 }
 
-/// Solves with the drawn moduli times @p factor, from no load or from the shapes that the poses have.
-void solve_times(double factor, const Body& drawn, const BodyMesh& body_mesh, const PhantomOptions& options,
-                 Truth::Start start, Phantom& phantom) {
-  Body body = drawn;
-  body.breast_kpa *= factor;
-  body.skin_kpa *= factor;
-  std::vector<TruthPose> poses = phantom.poses;
-  Truth truth(body_mesh, body, phantom.causes, phantom.nuisances ? &*phantom.nuisances : nullptr);
-  truth.solve(poses, start);
-  if (options.prior) phantom.discrepancy.emplace(truth, body_mesh, poses, options.seed);
-  phantom.poses = std::move(poses);
-  phantom.body = body;
-}
-
-/// A soft breast falls to the side all at once when it is turned on its back, and load steps stop there. Stiffer ones
-/// fall slowly, and their shapes lead down to that of the soft one.
-void solve_following(const BodyMesh& body_mesh, const PhantomOptions& options, Phantom& phantom) {
-  const Body drawn = phantom.body;
-  double factor = 1;
-  for (int tried = 0;; ++tried, factor *= much_stiffer) {
-    try {
-      solve_times(factor, drawn, body_mesh, options, Truth::Start::no_load, phantom);
-      break;
-    } catch (const NumericalFailure& failure) {
-      phantom.gave_way.push_back(failure.what());
-      if (tried == much_stiffer_tries) throw;
-    }
-  }
-  try {
-    while (factor > 1) {
-      factor = std::max(1.0, factor / softer);
-      solve_times(factor, drawn, body_mesh, options, Truth::Start::shapes, phantom);
-    }
-  } catch (const NumericalFailure& failure) {
-    phantom.gave_way.push_back(failure.what());
-  }
-}
-
 void solve(const BodyMesh& body_mesh, const PhantomOptions& options, Phantom& phantom) {
   const bool volunteers = options.population == Population::volunteers;
-  volunteers ? solve_following(body_mesh, options, phantom) : solve_stiffening(body_mesh, options, phantom);
+  volunteers ? solve_volunteer(body_mesh, options, phantom) : solve_stiffening(body_mesh, options, phantom);
   if (phantom.discrepancy)
     for (std::size_t p = 1; p < phantom.poses.size(); ++p)
       phantom.poses[p].x += phantom.discrepancy->displacement(phantom.poses[p].name);

@@ -49,8 +49,8 @@ struct Phantom {
 };
 
 /// Body, noise and holes depend on the seed alone, so that two phantoms of one seed differ by their causes only.
-/// Where the drawn moduli carry no equilibrium they are raised by 15 % up to six times; those of volunteers by half up
-/// to four times, and then lowered again as far as the shapes can be followed.
+/// Where the drawn moduli carry no equilibrium they are raised by 15 % up to six times; those of volunteers are scaled
+/// until the nipple moves as far as was drawn (solve_volunteer.h).
 /// @throws InputError        options; an unknown cause, a cause given twice, too many
 /// @throws NumericalFailure  no equilibrium even then
 Phantom make_phantom(const PhantomOptions& options);

@@ -35,9 +35,9 @@ struct ScanNoise {
   VectorXd repeats;  // points that say what one says
 };
 
-/// White is what neighbouring points show, where there are enough of them. Where that is less than the case says, the
-/// rest is taken to be shared. Points that repeat each other show nothing: where the case says how many they are worth,
-/// white is what it says, and each counts for less. Landmarks err one by one.
+/// White is what neighbouring points show, where there are enough of them, and no less than the least. Where that is
+/// less than the case says, the rest is taken to be shared. Points that repeat each other show nothing: where the case
+/// says how many they are worth, white is what it says, and each counts for less. Landmarks err one by one.
 /// @param worth  per measurement
 ScanNoise noise_of(const Residuals& residuals, const VectorXd& shared_mm,
                    const std::vector<std::optional<double>>& worth) {
@@ -55,7 +55,7 @@ ScanNoise noise_of(const Residuals& residuals, const VectorXd& shared_mm,
     const double seen = calibration::estimate_noise_mm(residuals.place(rows, Eigen::all), residuals.distance_mm(rows));
     for (const int r : rows) {
       const double given = residuals.sigma_mm[r];
-      noise.white_mm[r] = seen;
+      noise.white_mm[r] = std::max(seen, calibration::least_noise_mm);
       noise.shared_mm[r] = std::max(shared_mm[r], std::sqrt(std::max(0.0, given * given - seen * seen)));
     }
   }
@@ -210,6 +210,7 @@ BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, con
   };
   BaseFit base;
   base.noise_mm = noise_mm;
+  base.keeps_history = options.keeps_history;
   base.parameters.emplace(given);
   JointFitter fitter(evaluator, base, base);
   base.nuisances = nuisances_of(given, fitter.poses(), options.priors);

@@ -58,6 +58,7 @@ struct BaseFitOptions {
   Priors priors;
   bool other_meshes = true;                          ///< measure the mesh's error
   std::function<void(const std::string&)> progress;  ///< may be empty
+  bool keeps_history = false;                        ///< JointFit::history
 };
 
 /// Gauss–Newton in the moduli and the nuisances, from the model's values: distances are exact at every step, uneven

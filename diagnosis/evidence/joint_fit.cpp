@@ -2,6 +2,7 @@
 #include "diagnosis/evidence/joint_fit.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "calibration/work_limit.h"
@@ -24,6 +25,19 @@ constexpr double lost_mm =
     5;  // rms: further off, closest points may lie on the wrong side of a body as slender as a bar
 constexpr double other_moduli[] = {0.5, 2, 0.7, 1.4, 0.35, 2.8, 0.25, 4};
 
+void note(const VectorXd& u, bool failed, JointFit& fit) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  if (!fit.keeps_history) return;
+  calibration::FitEvaluation row{fit.parameters->values(u), nan, nan, nan, failed, false, 0};
+  if (!failed) {
+    const VectorXd skin = fit.fit.residuals.skin_mm();
+    row.mae_study_mm = fit.fit.prediction.mae_study_mm();
+    row.mae_mm = skin.cwiseAbs().mean();
+    row.rms_mm = rms(skin);
+  }
+  fit.history.push_back(row);
+}
+
 void solve(calibration::Evaluator& evaluator, const std::vector<std::string>& poses, const JointTrial& at,
            const simulation::ChainSolution* near, const BaseFit& ground, JointFit& fit) {
   fit.model = with_nuisances(fit.parameters->model(at.u), at.nuisances, poses);
@@ -33,6 +47,7 @@ void solve(calibration::Evaluator& evaluator, const std::vector<std::string>& po
   if (fit.fit.mask.empty()) fit.fit.mask = calibration::points_over_skin(fit.fit.prediction);
   fit.fit.residuals = calibration::residuals_of(evaluator.scene(), fit.fit.prediction, fit.fit.mask, ground.noise_mm);
   ++fit.evaluations;
+  note(at.u, false, fit);
 }
 
 /// Coordinates with every Young's modulus of the base model so many times as stiff.
@@ -58,12 +73,11 @@ void solve_first(calibration::Evaluator& evaluator, const std::vector<std::strin
     } catch (const NumericalFailure&) {
       continue;  // no equilibrium with these
     }
-    fit.evaluations = trial.evaluations;
+    fit.evaluations = trial.evaluations, fit.history = trial.history;
     if (rms(trial.fit.residuals.skin_mm()) < rms(best.fit.residuals.skin_mm())) best = std::move(trial);
   }
-  const int evaluations = fit.evaluations;
+  best.evaluations = fit.evaluations, best.history = std::move(fit.history);
   fit = std::move(best);
-  fit.evaluations = evaluations;
 }
 
 /// The shapes that a trial is likely to have, to first order.
@@ -106,6 +120,7 @@ void JointFitter::predict(const JointTrial& at, const simulation::ChainSolution*
   else
     solve(evaluator_, poses_, at, near, ground_, fit_);
   if (!first) return;
+  for (calibration::FitEvaluation& row : fit_.history) row.accepted = row.values == fit_.parameters->values(fit_.fit.u);
   fit_.dearest = std::max(fit_.dearest, fit_.fit.prediction.solution.work);
   if (near != nullptr) fit_.dearest = std::max(fit_.dearest, near->work);
 }
@@ -147,9 +162,13 @@ bool JointFitter::improve() {
     try {
       const calibration::TrialLimit limit(evaluator_.chain(), fit_.dearest);
       predict(trial, &near);
-      if (objective() < before) return true;
+      if (objective() < before) {
+        ++fit_.steps;
+        if (fit_.keeps_history) fit_.history.back().accepted = true;
+        return true;
+      }
     } catch (const NumericalFailure&) {
-      // No equilibrium there: a shorter step.
+      note(trial.u, true, fit_);  // no equilibrium there: a shorter step
     }
     if (promised < worth_shortening) break;
   }

@@ -22,7 +22,10 @@ struct JointFit {
   std::vector<Nuisance> nuisances;                        ///< at the optimum
   double size_mm = 0;                                     ///< s of the discrepancy that is likeliest
   int evaluations = 0;
+  int steps = 0;    ///< that lowered F
   int dearest = 0;  ///< work of the dearest solution that was of use (ChainSolution::work)
+  bool keeps_history = false;
+  std::vector<calibration::FitEvaluation> history;  ///< every trial, where it is kept
 };
 
 /// Where a step would lead: coordinates of the free parameters, and nuisances at their values.

@@ -41,11 +41,11 @@ class CalibrateTool : public Tool {
     app.add_option("--model", model_file_, "the model to start from (default: CASE/model.toml)");
     app.add_option(
            "--method", options_.method,
-           "least-squares (signed distances scan to model, exact sensitivities), joint (with all that is never known: "
-           "place of the scans, gravity, breath, uneven tissue, the mesh's error; landmarks count; a minute) or cmaes "
-           "(the study's: MAE model to scan, without gradient; value and prior_sd are its start and sigma)")
-        ->check(CLI::IsMember({"least-squares", "joint", "cmaes"}))
-        ->capture_default_str();
+           "joint (with all that is never known: place of the scans, gravity, breath, uneven tissue, the mesh's error; "
+           "landmarks count; half a minute), least-squares (signed distances scan to model, scans taken to lie in "
+           "place; seconds) or cmaes (the study's: MAE model to scan, without gradient; value and prior_sd are its "
+           "start and sigma). Default: joint; least-squares beside an option that only it knows")
+        ->check(CLI::IsMember({"least-squares", "joint", "cmaes"}));
     app.add_option("--until-mae", options_.until_mae_mm,
                    "MAE model to scan (study) to reach, mm: cmaes stops there; not reached: exit code 1");
     app.add_option("--seed", options_.seed, "of everything that is drawn")->capture_default_str();
@@ -87,6 +87,8 @@ class CalibrateTool : public Tool {
   Outcome run(Run& run) override {
     run.stage("read");
     options_.use_priors = !no_priors_;
+    options_.map = map_ > 0;
+    options_.choose_method();
     check_options();
     claim_targets(run);
     measured_ = read_measured_case(run, case_folder_, mesh_file_, model_file_);
@@ -120,8 +122,6 @@ class CalibrateTool : public Tool {
     if (!parts_.empty() && options_.intervals != "profile") throw InputError("--merge goes with --intervals profile");
     if (!options_.profile_of.empty() && map_ > 0)
       throw InputError("--map goes with a whole calibration, not with --profile-of");
-    if (options_.method == "joint" && map_ > 0)
-      throw InputError("--map goes with another method than joint; leave it out, or take --method least-squares");
   }
 
   /// Before the work, so that nobody waits for an answer that cannot be written.

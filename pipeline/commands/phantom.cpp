@@ -215,6 +215,7 @@ class PhantomTool : public Tool {
     f["population"] = population_;
     f["gave_way"] = phantom.gave_way;
     f["motion"] = motion_figures(phantom.motion);
+    f["motion"]["nipple_drawn_mm"] = phantom.body.nipple_moves_mm;
   }
 
   Json figures(const fs::path& folder, const phantom::Phantom& phantom) const {

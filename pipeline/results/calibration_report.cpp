@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "calibration/tissue_range.h"
+#include "diagnosis/evidence/never_known.h"
 
 namespace supine::pipeline {
 namespace {
@@ -23,6 +24,32 @@ Json figures_json(const DistanceFigures& f) {
           {"median_mm", number(f.median_mm)},
           {"p95_mm", number(f.p95_mm)},
           {"mean_signed_mm", number(f.mean_signed_mm)}};
+}
+
+/// By source, how much of a coordinate's variance that leaves; empty where nothing but points is allowed for.
+std::map<std::string, double> never_known_variances(const CalibrationResult& result, Eigen::Index i) {
+  std::map<std::string, double> variances;
+  for (std::size_t k = 0; k < result.never_known.size(); ++k)
+    variances[result.never_known[k]] += std::pow(result.uncertainty.never_known(i, static_cast<Eigen::Index>(k)), 2);
+  return variances;
+}
+
+/// Of a parameter most of whose interval is what nobody knows: how much, and what most of all.
+std::optional<std::string> never_known_remark(const FreeParameters& parameters, const CalibrationResult& result,
+                                              Eigen::Index i) {
+  constexpr double most = 0.5;
+  const auto variances = never_known_variances(result, i);
+  if (variances.empty()) return {};
+  double sum = 0;
+  for (const auto& [source, variance] : variances) sum += variance;
+  const double share = sum / result.uncertainty.covariance(i, i);
+  if (!(share > most)) return {};
+  const auto largest = std::max_element(variances.begin(), variances.end(),
+                                        [](const auto& a, const auto& b) { return a.second < b.second; });
+  return fmt::format(
+      "{:.0f} % of what is left open of {} is what nobody knows, most of it {}. --method joint fits that as well and "
+      "leaves less open",
+      100 * share, parameters.names()[static_cast<std::size_t>(i)], diagnosis::words_of_source(largest->first));
 }
 
 Json parameters_json(const FreeParameters& parameters, const CalibrationResult& result) {
@@ -59,10 +86,13 @@ Json worth_json(const FreeParameters& parameters, const CalibrationResult& resul
     const auto& believed = parameters.priors()[k];
     const calibration::Prior* prior = result.used_priors && believed ? &*believed : nullptr;
     const auto& alone = result.likelihoods[k];
+    Json never_known = Json::object();
+    for (const auto& [source, variance] : never_known_variances(result, i)) never_known[source] = std::sqrt(variance);
     coordinates.push_back({{"name", parameters.names()[k]},
                            {"coordinate", parameters.is_log(i) ? "ln(value)" : "value, scaled"},
                            {"sd", sd[i]},
                            {"sd_if_points_erred_alone", std::sqrt(u.white(i, i))},
+                           {"sd_never_known", never_known},
                            {"at", result.fit.u[i]},
                            {"prior_mean", prior ? Json(prior->mean) : Json(nullptr)},
                            {"prior_sd", prior ? Json(prior->sd) : Json(nullptr)},
@@ -95,6 +125,8 @@ std::vector<std::string> calibration_remarks(const FreeParameters& parameters, c
         "the scan lies where it should (--scan-offset, supine-register), and at what the model lacks (supine-diagnose)",
         name, parameters.value(i, result.fit.u[i]), range.softest_kpa, range.stiffest_kpa));
   }
+  for (Eigen::Index i = 0; i < parameters.size(); ++i)
+    if (const auto remark = never_known_remark(parameters, result, i)) remarks.push_back(*remark);
   for (const auto& pair : result.uncertainty.not_told_apart)
     remarks.push_back(fmt::format("{} and {} cannot be told apart here (correlation {:.3f}): {}", pair.first,
                                   pair.second, pair.correlation,
@@ -129,6 +161,7 @@ Json calibration_figures(const MeasuredCase& measured, const FreeParameters& par
   f["mae_study_mm"] = number(fit.prediction.mae_study_mm());
   f["mae_mm"] = result.in_sample.mae_mm;
   f["rms_mm"] = result.in_sample.rms_mm;
+  if (result.as_given) f["as_given"] = figures_json(*result.as_given);
   f["held_out_rms_mm"] = result.held_out_blocks.rms_mm;
   f["held_out"] = {{"blocks", 6}, {"by_block", figures_json(result.held_out_blocks)}, {"by_pose", Json::array()}};
   for (const auto& pose : result.held_out_poses) {
@@ -182,6 +215,7 @@ void say_calibration(const Run& run, const FreeParameters& parameters, const Cal
   };
   run.say(fmt::format("  {:<36}{:>10}{:>10}", "error, mm", "MAE", "RMS"));
   row("fitted points", result.in_sample);
+  if (result.as_given) row("the same, scans and gravity as given", *result.as_given);
   row("held out, 6 blocks of skin", result.held_out_blocks);
   for (const auto& pose : result.held_out_poses) row("held out, pose " + pose.pose, pose.figures);
   const double study = result.fit.prediction.mae_study_mm();  // a contour covers no area

@@ -23,7 +23,9 @@ struct CalibrationResult {
   std::vector<std::optional<Likelihood>> likelihoods;  ///< per coordinate, its own prior taken out
   std::string interval_kind;                           ///< profile, linear or posterior
   std::vector<double> noise_mm;
-  calibration::DistanceFigures in_sample;        ///< points that were fitted
+  calibration::DistanceFigures in_sample;  ///< points that were fitted
+  /// Of the joint method: the same model without what was found of scans' places, gravity and the rest.
+  std::optional<calibration::DistanceFigures> as_given;
   calibration::DistanceFigures held_out_blocks;  ///< the same points, each predicted from a fit without its block
   struct PoseError {
     std::string pose;
@@ -37,6 +39,8 @@ struct CalibrationResult {
     double value, sd;
   };
   std::vector<Nuisance> nuisances;
+  /// Of the other methods: where the columns of Uncertainty::never_known come from (diagnosis::NeverKnown::sources).
+  std::vector<std::string> never_known;
   std::map<std::string, calibration::Profile> profiles;  ///< of intervals that are profiles, by parameter
 };
 

@@ -12,6 +12,8 @@
 #include "common/error.h"
 #include "common/suggestion.h"
 #include "diagnosis/evidence/base_fit.h"
+#include "diagnosis/evidence/never_known.h"
+#include "diagnosis/evidence/nuisance_words.h"
 #include "diagnosis/weighted_fit.h"
 #include "pipeline/case/case_priors.h"
 #include "pipeline/case/model_edit.h"
@@ -49,6 +51,12 @@ void add_scan_offset(simulation::Model& model) {
   model.effects.push_back(setting);
 }
 
+diagnosis::Priors priors_of(const MeasuredCase& measured) {
+  diagnosis::Priors priors = case_priors(measured.description, {});
+  priors.patchiness = read_patchiness(measured.model_text);
+  return priors;
+}
+
 class Calibration {
  public:
   Calibration(Run& run, const MeasuredCase& measured, const FreeParameters& parameters, const CalibrateOptions& asked,
@@ -63,6 +71,7 @@ class Calibration {
     result.object = measured_.description.is_object();
     result.noise_mm = options.noise_mm;
     run_.stage("fit");
+    run_.say("  method " + asked_.method);
     Eigen::MatrixXd posterior;
     if (asked_.method == "joint")
       posterior = fit_jointly(options, result);
@@ -70,7 +79,7 @@ class Calibration {
       result.fit = asked_.method == "cmaes" ? search_cmaes(evaluator, options)
                                             : calibration::fit_least_squares(evaluator, parameters_, options);
     run_.stage("worth");
-    result.uncertainty = calibration::judge(skin_of(result.fit), parameters_, options.use_priors);
+    find_worth(evaluator, options, result);
     result.used_priors = options.use_priors;
     result.likelihoods =
         calibration::likelihoods(skin_of(result.fit), parameters_, result.uncertainty, options.use_priors);
@@ -84,6 +93,19 @@ class Calibration {
   }
 
  private:
+  /// The joint fit's own posterior allows for what is never known already.
+  void find_worth(Evaluator& evaluator, const calibration::FitOptions& options, CalibrationResult& result) const {
+    const Fit skin = skin_of(result.fit);
+    Eigen::MatrixXd shapes;
+    if (asked_.method != "joint") {
+      diagnosis::NeverKnown all =
+          diagnosis::never_known_at(evaluator, parameters_.model(skin.u), skin, priors_of(measured_));
+      result.never_known = std::move(all.sources);
+      shapes = std::move(all.shapes_mm);
+    }
+    result.uncertainty = calibration::judge(skin, parameters_, options.use_priors, shapes);
+  }
+
   void find_profiles(Evaluator& evaluator, const calibration::FitOptions& options, CalibrationResult& result) const {
     const auto wanted = [this](const std::string& name) {
       return asked_.profile_of.empty() || std::count(asked_.profile_of.begin(), asked_.profile_of.end(), name) > 0;
@@ -124,8 +146,8 @@ class Calibration {
   /// Moduli together with all that is never known. @return  covariance of the coordinates, over all else
   Eigen::MatrixXd fit_jointly(const calibration::FitOptions& options, CalibrationResult& result) {
     diagnosis::BaseFitOptions joint;
-    joint.priors = case_priors(measured_.description, {});
-    joint.priors.patchiness = read_patchiness(measured_.model_text);
+    joint.priors = priors_of(measured_);
+    joint.keeps_history = true;
     joint.progress = [this](const std::string& what) { live_.show(what); };
     Evaluator evaluator(measured_.marked_scene(), parameters_.base(), diagnosis::accurate_enough());
     diagnosis::BaseFit base =
@@ -134,11 +156,44 @@ class Calibration {
     const diagnosis::JointPosterior posterior = diagnosis::posterior_of(base);
     for (Eigen::Index k = parameters_.size(); k < posterior.value.size(); ++k)
       result.nuisances.push_back({posterior.names[static_cast<std::size_t>(k)], posterior.value[k], posterior.sd[k]});
+    warn_of_far(base);
+    result.as_given = as_given(evaluator, base);
     result.fit = std::move(base.fit);
-    result.fit.evaluations = base.evaluations;
+    result.fit.history = std::move(base.history);
+    result.fit.failed = static_cast<int>(std::count_if(result.fit.history.begin(), result.fit.history.end(),
+                                                       [](const auto& row) { return row.failed; }));
+    result.fit.evaluations = base.evaluations + result.fit.failed;
+    result.fit.iterations = base.steps;
     result.fit.converged = true;
     result.fit.message = "joint fit with all that is never known";
     return posterior.of_parameters;
+  }
+
+  /// A fit that moves what is never known this far makes up for something else with it.
+  void warn_of_far(const diagnosis::BaseFit& base) const {
+    constexpr double far = 4;  // sigma
+    const auto furthest =
+        std::max_element(base.nuisances.begin(), base.nuisances.end(),
+                         [](const auto& a, const auto& b) { return std::abs(a.value) < std::abs(b.value); });
+    if (furthest == base.nuisances.end() || std::abs(furthest->value) < far) return;
+    run_.warn(fmt::format(
+        "{} ended {:.1f} sigma from where it is expected: it makes up for something else, and the moduli with it. Look "
+        "at the scan beside the model (supine-compare, supine-register), fit without it (--method least-squares), or "
+        "ask what is missing (supine-diagnose)",
+        diagnosis::words_of(furthest->name()), std::abs(furthest->value)));
+  }
+
+  /// The fitted model's errors where scans lie as they were given and nothing else is moved: what supine-compare says.
+  std::optional<calibration::DistanceFigures> as_given(Evaluator& evaluator, const diagnosis::BaseFit& base) const {
+    const simulation::Model model = base.parameters->model(base.fit.u);
+    try {
+      const calibration::Prediction prediction = evaluator.predict(model, &base.fit.prediction.solution);
+      return calibration::figures_of(prediction.scan_distances());
+    } catch (const NumericalFailure& why) {
+      run_.warn(fmt::format("with gravity, breath and the rest as given the fitted model has no equilibrium ({})",
+                            why.what()));
+      return {};
+    }
   }
 
   void take_posterior(const Eigen::MatrixXd& covariance, CalibrationResult& result) const {
@@ -201,8 +256,9 @@ class Calibration {
     } catch (const NumericalFailure& why) {
       run_.warn(
           fmt::format("no figures of the held-out pose {}: the fitted model has no equilibrium there ({}). Fit it "
-                      "as well ([calibration] poses), or the places of the scans with the moduli (--method joint)",
-                      held_out.pose.name, why.what()));
+                      "as well ([calibration] poses){}",
+                      held_out.pose.name, why.what(),
+                      asked_.method == "joint" ? "" : ", or the places of the scans with the moduli (--method joint)"));
     }
   }
 
@@ -226,6 +282,39 @@ void check_choice(const char* name, const std::string& value, const std::vector<
 
 }  // namespace
 
+/// An option that was given, and the methods that use it.
+struct CalibrateOptions::Use {
+  bool given;
+  const char* option;
+  std::vector<std::string> methods;
+  bool by(const std::string& method) const {
+    return std::find(methods.begin(), methods.end(), method) != methods.end();
+  }
+};
+
+std::vector<CalibrateOptions::Use> CalibrateOptions::uses() const {
+  const CalibrateOptions usual;
+  return {
+      {!use_priors, "--no-priors", {"least-squares", "cmaes"}},
+      {scan_offset, "--scan-offset", {"least-squares", "cmaes"}},
+      {map, "--map", {"least-squares", "cmaes"}},
+      {intervals == "profile", "--intervals profile", {"least-squares"}},
+      {starts != usual.starts, "--starts", {"least-squares"}},
+      {robust_mm != usual.robust_mm, "--robust", {"least-squares"}},
+      {!own.empty(), "own residuals", {"least-squares"}},
+      {population != usual.population, "--population", {"cmaes"}},
+      {max_evaluations != usual.max_evaluations, "--max-evaluations", {"cmaes"}},
+  };
+}
+
+void CalibrateOptions::choose_method() {
+  if (!method.empty()) return;
+  const auto all = uses();
+  const bool least_squares = std::any_of(
+      all.begin(), all.end(), [](const Use& use) { return use.given && !use.by("joint") && use.by("least-squares"); });
+  method = least_squares || until_mae_mm ? "least-squares" : "joint";
+}
+
 void CalibrateOptions::check() const {
   constexpr double any = std::numeric_limits<double>::max(), above_zero = std::numeric_limits<double>::min();
   check_choice("method", method, {"least-squares", "joint", "cmaes"});
@@ -238,37 +327,16 @@ void CalibrateOptions::check() const {
     throw InputError(fmt::format("until_mae_mm = {}: must be above 0", *until_mae_mm));
   if (!profile_of.empty() && (intervals != "profile" || method != "least-squares"))
     throw InputError("--profile-of goes with --intervals profile and the method least-squares");
-  if (!own.empty() && method != "least-squares")
-    throw InputError(fmt::format("own residuals go with the method least-squares, not with {}", method));
   if (!own.empty() && intervals == "profile")
     throw InputError("own residuals go with linear intervals: profiles are of the distances alone");
-  check_method_uses();
-}
-
-void CalibrateOptions::check_method_uses() const {
-  const CalibrateOptions usual;
-  struct Use {
-    bool given;
-    const char* option;
-    std::vector<std::string> methods;
-  };
-  const std::vector<Use> uses = {
-      {!use_priors, "--no-priors", {"least-squares", "cmaes"}},
-      {scan_offset, "--scan-offset", {"least-squares", "cmaes"}},
-      {intervals == "profile", "--intervals profile", {"least-squares"}},
-      {starts != usual.starts, "--starts", {"least-squares"}},
-      {robust_mm != usual.robust_mm, "--robust", {"least-squares"}},
-      {population != usual.population, "--population", {"cmaes"}},
-      {max_evaluations != usual.max_evaluations, "--max-evaluations", {"cmaes"}},
-  };
-  for (const auto& [given, option, methods] : uses)
-    if (given && std::find(methods.begin(), methods.end(), method) == methods.end())
-      throw InputError(fmt::format("{} has no effect on --method {}{}; leave it out, or take --method {}", option,
+  for (const Use& use : uses())
+    if (use.given && !use.by(method))
+      throw InputError(fmt::format("{} has no effect on --method {}{}; leave it out, or take --method {}", use.option,
                                    method,
                                    method == "joint" ? ", which has priors, the scans' places and the intervals of its "
                                                        "posterior in it"
                                                      : "",
-                                   listed(methods)));
+                                   listed(use.methods)));
 }
 
 FreeParameters parameters_to_fit(Run& run, const MeasuredCase& measured, const CalibrateOptions& options) {

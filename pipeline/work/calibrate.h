@@ -15,9 +15,9 @@ namespace supine::pipeline {
 
 /// What is asked for beside case and model; as the options of supine-calibrate.
 struct CalibrateOptions {
-  std::string method = "least-squares";  ///< least-squares, joint or cmaes
-  std::string intervals = "linear";      ///< linear or profile
-  std::optional<double> until_mae_mm;    ///< the study's MAE to reach; cmaes stops there
+  std::string method = {};             ///< least-squares, joint or cmaes; empty: choose_method() says which
+  std::string intervals = "linear";    ///< linear or profile
+  std::optional<double> until_mae_mm;  ///< the study's MAE to reach; cmaes stops there
   unsigned seed = 1;
   int starts = 1;
   double robust_mm = 5;
@@ -26,14 +26,19 @@ struct CalibrateOptions {
   std::map<std::string, calibration::Profile> known_profiles = {};  ///< taken as they are, by parameter
   bool use_priors = true;
   bool scan_offset = false;                               ///< the scan's place is fitted as well
+  bool map = false;                                       ///< a map of the error follows
   std::vector<const calibration::OwnResidual*> own = {};  ///< least-squares: what counts beside the scans
 
+  /// Where no method is named: joint, or least-squares where something is asked for that joint does not know.
+  void choose_method();
+
   /// @throws InputError  naming the option: a method or kind of interval there is not, a number out of its range, what
-  ///   does not go with the method
+  ///   does not go with the method   @pre  a method
   void check() const;
 
  private:
-  void check_method_uses() const;
+  struct Use;
+  std::vector<Use> uses() const;
 };
 
 /// The model's free numbers, with what a population says of them, and where the search begins.

@@ -32,6 +32,7 @@ std::unique_ptr<Calibration> calibrate(const pipeline::Case& description, const 
                                        py::object progress) {
   std::list<PythonResidual> own;
   for (const py::object& residual : residuals) options.own.push_back(&own.emplace_back(residual));
+  options.choose_method();
   options.check();
   EngineRun engine("calibrate", std::move(progress));
   auto made = engine.call([&](pipeline::Run& run) {
@@ -92,7 +93,8 @@ void bind_arrays(py::class_<Calibration>& bound) {
   bound
       .def_property_readonly("residuals_mm",
                              view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.distance_mm; }),
-                             "R, mm: signed distances of the scan's points, > 0 where the scan lies outside the model.")
+                             "R, mm: signed distances of the scan's points, > 0 where the scan lies outside the model. "
+                             "With joint the last rows are of landmarks, three each (figures['landmarks_used']).")
       .def_property_readonly("residual_places",
                              view_as([](const CalibrationResult& r) -> auto& { return r.fit.residuals.place; }),
                              "R by 3, mm: the scan's points.")
@@ -147,12 +149,12 @@ void bind_calibration(py::module_& module) {
   bind_class(module);
   module.def(
       "calibrate",
-      [](const pipeline::Case& description, const Mesh& mesh, const Model& model, std::string method,
+      [](const pipeline::Case& description, const Mesh& mesh, const Model& model, std::optional<std::string> method,
          std::string intervals, std::optional<double> until_mae_mm, unsigned seed, int starts, double robust_mm,
          int population, int max_evaluations, bool use_priors, bool scan_offset,
          const std::vector<py::object>& residuals, py::object progress) {
         pipeline::CalibrateOptions options;
-        options.method = std::move(method);
+        options.method = method.value_or("");
         options.intervals = std::move(intervals);
         options.until_mae_mm = until_mae_mm;
         options.seed = seed;
@@ -164,14 +166,14 @@ void bind_calibration(py::module_& module) {
         options.scan_offset = scan_offset;
         return calibrate(description, mesh, model, std::move(options), residuals, std::move(progress));
       },
-      py::arg("case"), py::arg("mesh"), py::arg("model"), py::kw_only(), py::arg("method") = "least-squares",
+      py::arg("case"), py::arg("mesh"), py::arg("model"), py::kw_only(), py::arg("method") = py::none(),
       py::arg("intervals") = "linear", py::arg("until_mae_mm") = py::none(), py::arg("seed") = 1, py::arg("starts") = 1,
       py::arg("robust_mm") = 5.0, py::arg("population") = 0, py::arg("max_evaluations") = 300,
       py::arg("use_priors") = true, py::arg("scan_offset") = false, py::arg("residuals") = py::list(),
       py::arg("progress") = py::none(),
       "Fits the free numbers of the model to the measured surfaces, as supine-calibrate does.\n\n"
-      "method: least-squares, joint or cmaes. residuals: supine.Residual objects that count beside the scans "
-      "(least-squares).");
+      "method: joint, least-squares or cmaes; None: joint, or least-squares beside an option that only it knows. "
+      "residuals: supine.Residual objects that count beside the scans (least-squares).");
 }
 
 }  // namespace supine::python

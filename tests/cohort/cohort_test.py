@@ -205,7 +205,8 @@ class PooledCalibrations(unittest.TestCase):
             model = work / f"model{i}.toml"
             text = (SMALL / "model.toml").read_text().replace("poisson_ratio = 0.45", f"poisson_ratio = 0.44{i + 1}")
             model.write_text(text.replace("value = 2.0, prior_sd = 1.0", prior))
-            said = run([BIN / "supine-calibrate", SMALL, SMALL / "out/mesh.vtu", "--model", model, "-o", case / "out", "--threads", "1", *options])
+            said = run([BIN / "supine-calibrate", SMALL, SMALL / "out/mesh.vtu", "--model", model, "-o", case / "out", "--threads", "1",
+                        "--method", "least-squares", *options])
             self.assertIn(said.returncode, (0, 1), said.stdout)
             patients.append(json.loads((case / "out/calibration.json").read_text()))
         said = run([BIN / "supine-cohort", work / "cohort"])
@@ -224,7 +225,7 @@ class PooledCalibrations(unittest.TestCase):
                 self.assertIsNone(patients[0]["worth"]["coordinates"][0]["prior_sd"])
             self.assertAlmostEqual(math.log(found["median"]["value"]), alone, delta=0.05, msg=prior)
             low, high = (math.log(end) for end in found["median"]["interval95"])
-            self.assertTrue(low < alone < high and high - low < 1.5, (prior, low, high))
+            self.assertTrue(low < alone < high and high - low < 2.5, (prior, low, high))  # the scan may lie elsewhere
 
 
 class StagesOnTheWay(unittest.TestCase):

@@ -12,9 +12,10 @@ from support import CASE, MESH, SmallCase, figures, tool
 class Calibrate(SmallCase):
     def test_model_figures_and_history_are_those_of_the_tool(self):
         out = self.folder / "tool"
-        self.assertIn(tool("supine-calibrate", CASE, MESH, "-o", out, "--threads", "2")[0], (0, 1))
+        self.assertIn(tool("supine-calibrate", CASE, MESH, "-o", out, "--threads", "2",
+                           "--method", "least-squares")[0], (0, 1))
         lines = []
-        fit = supine.calibrate(self.case, self.mesh, self.model, progress=lines.append)
+        fit = supine.calibrate(self.case, self.mesh, self.model, method="least-squares", progress=lines.append)
         self.assertEqual(fit.model.text, (out / "model.toml").read_text())
         self.assertEqual(fit.figures, figures(out / "calibration.json"))
         self.assertTrue(any("RMS" in line for line in lines))
@@ -26,6 +27,16 @@ class Calibrate(SmallCase):
         self.assertAlmostEqual(np.sqrt(np.mean(fit.residuals_mm ** 2)), fit.figures["rms_mm"], places=9)
         again = supine.simulate(self.case, self.mesh, fit.model, poses=["supine"])
         np.testing.assert_allclose(fit["supine"], again["supine"], atol=1e-5)
+
+    def test_without_a_method_all_that_is_never_known_is_fitted_too(self):
+        out = self.folder / "tool"
+        self.assertIn(tool("supine-calibrate", CASE, MESH, "-o", out, "--threads", "2")[0], (0, 1))
+        fit = supine.calibrate(self.case, self.mesh, self.model)
+        self.assertEqual(fit.figures["method"], "joint")
+        self.assertEqual(fit.model.text, (out / "model.toml").read_text())
+        self.assertEqual(fit.figures, figures(out / "calibration.json"))
+        self.assertEqual(len(fit.history["rms_mm"]), fit.figures["evaluations"])
+        self.assertEqual(supine.calibrate(self.case, self.mesh, self.model, starts=2).figures["method"], "least-squares")
 
     def test_options_are_checked_as_the_tools_do(self):
         with self.assertRaises(supine.InputError) as both:

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "phantom/solve_volunteer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/error.h"
+#include "phantom/volunteers.h"
+
+namespace supine::phantom {
+namespace {
+
+constexpr int stiffer_tries = 4;
+constexpr double stiffer = 1.5;
+constexpr double close_enough = 0.03;  // of the way the nipple is to move
+constexpr int most_solves = 12;
+constexpr double longest_step = 1.25, shortest_step = 1.02;         // factors of the moduli: softer shapes are followed
+constexpr double usual_slope = -1, steepest = -4, flattest = -0.3;  // of ln way over ln factor
+
+class Search {
+ public:
+  Search(const BodyMesh& body_mesh, const PhantomOptions& options, Phantom& phantom)
+      : body_mesh_(body_mesh), options_(options), phantom_(phantom), drawn_(phantom.body) {}
+
+  void run() {
+    carry();
+    for (int solves = 0; solves < most_solves && std::abs(moved_ / drawn_.nipple_moves_mm - 1) > close_enough; ++solves)
+      if (!step()) break;
+  }
+
+ private:
+  /// From no load, stiffer until it is carried.
+  void carry() {
+    for (int tried = 0;; ++tried, factor_ *= stiffer) try {
+        return solve(factor_, Truth::Start::no_load);
+      } catch (const NumericalFailure& failure) {
+        phantom_.gave_way.push_back(failure.what());
+        if (tried == stiffer_tries) throw;
+      }
+  }
+
+  /// Towards the way that was drawn. @return  false: the moduli end there
+  bool step() {
+    const double wanted = factor_ * std::pow(drawn_.nipple_moves_mm / moved_, 1 / slope_);
+    const double next = std::clamp(within_range(wanted), factor_ / longest_, factor_ * stiffer);
+    if (std::abs(next / factor_ - 1) < 1e-3) {
+      phantom_.gave_way.push_back(
+          fmt::format("the nipple moves {:.0f} mm at the end of the moduli's range, {:.0f} were drawn", moved_,
+                      drawn_.nipple_moves_mm));
+      return false;
+    }
+    const double before = factor_, moved = moved_;
+    try {
+      solve(next, Truth::Start::shapes);
+    } catch (const NumericalFailure& failure) {
+      phantom_.gave_way.push_back(failure.what());
+      longest_ = std::sqrt(longest_);
+      return longest_ > shortest_step && next < before;
+    }
+    slope_ = std::clamp(std::log(moved_ / moved) / std::log(factor_ / before), steepest, flattest);
+    return true;
+  }
+
+  /// A factor that leaves both moduli in their ranges, or no further outside than they are.
+  double within_range(double factor) const {
+    const double least = std::max(softest_breast_kpa / drawn_.breast_kpa, softest_skin_kpa / drawn_.skin_kpa);
+    const double most = std::min(stiffest_breast_kpa / drawn_.breast_kpa, stiffest_skin_kpa / drawn_.skin_kpa);
+    return std::clamp(factor, std::min(least, factor_), std::max(most, factor_));
+  }
+
+  void solve(double factor, Truth::Start start) {
+    Body body = drawn_;
+    body.breast_kpa *= factor;
+    body.skin_kpa *= factor;
+    std::vector<TruthPose> poses = phantom_.poses;
+    Truth truth(body_mesh_, body, phantom_.causes, phantom_.nuisances ? &*phantom_.nuisances : nullptr);
+    truth.solve(poses, start);
+    if (options_.prior) phantom_.discrepancy.emplace(truth, body_mesh_, poses, options_.seed);
+    phantom_.poses = std::move(poses);
+    phantom_.body = body;
+    factor_ = factor;
+    moved_ = measure_motion(body_mesh_, body, phantom_.poses[0].x, phantom_.poses[1].x, options_.seed).nipple_mm.norm();
+  }
+
+  const BodyMesh& body_mesh_;
+  const PhantomOptions& options_;
+  Phantom& phantom_;
+  Body drawn_;
+  double factor_ = 1, moved_ = 0, slope_ = usual_slope, longest_ = longest_step;
+};
+
+}  // namespace
+
+void solve_volunteer(const BodyMesh& body_mesh, const PhantomOptions& options, Phantom& phantom) {
+  Search(body_mesh, options, phantom).run();
+}
+
+}  // namespace supine::phantom
