@@ -34,6 +34,7 @@ class Search {
   /// From no load, stiffer until it is carried.
   void carry() {
     for (int tried = 0;; ++tried, factor_ *= stiffer) try {
+        carried_ = factor_;
         return solve(factor_, Truth::Start::no_load);
       } catch (const NumericalFailure& failure) {
         phantom_.gave_way.push_back(failure.what());
@@ -63,17 +64,26 @@ class Search {
     return true;
   }
 
-  /// A factor that leaves both moduli in their ranges, or no further outside than they are.
+  /// A factor beyond which both moduli stay at the ends of their ranges is none.
   double within_range(double factor) const {
-    const double least = std::max(softest_breast_kpa / drawn_.breast_kpa, softest_skin_kpa / drawn_.skin_kpa);
-    const double most = std::min(stiffest_breast_kpa / drawn_.breast_kpa, stiffest_skin_kpa / drawn_.skin_kpa);
-    return std::clamp(factor, std::min(least, factor_), std::max(most, factor_));
+    const double least = std::min(softest_breast_kpa / drawn_.breast_kpa, softest_skin_kpa / drawn_.skin_kpa);
+    const double most = std::max(stiffest_breast_kpa / drawn_.breast_kpa, stiffest_skin_kpa / drawn_.skin_kpa);
+    return std::clamp(factor, least, std::max(most, carried_));
+  }
+
+  /// Each in its own range; where the body is carried by stiffer ones alone, up to these.
+  Body scaled(double factor) const {
+    Body body = drawn_;
+    const double most = std::max(carried_, 1.0);
+    body.breast_kpa = std::clamp(factor * drawn_.breast_kpa, softest_breast_kpa,
+                                 std::max(stiffest_breast_kpa, most * drawn_.breast_kpa));
+    body.skin_kpa =
+        std::clamp(factor * drawn_.skin_kpa, softest_skin_kpa, std::max(stiffest_skin_kpa, most * drawn_.skin_kpa));
+    return body;
   }
 
   void solve(double factor, Truth::Start start) {
-    Body body = drawn_;
-    body.breast_kpa *= factor;
-    body.skin_kpa *= factor;
+    const Body body = scaled(factor);
     std::vector<TruthPose> poses = phantom_.poses;
     Truth truth(body_mesh_, body, phantom_.causes, phantom_.nuisances ? &*phantom_.nuisances : nullptr);
     truth.solve(poses, start);
@@ -88,7 +98,7 @@ class Search {
   const PhantomOptions& options_;
   Phantom& phantom_;
   Body drawn_;
-  double factor_ = 1, moved_ = 0, slope_ = usual_slope, longest_ = longest_step;
+  double factor_ = 1, carried_ = 1, moved_ = 0, slope_ = usual_slope, longest_ = longest_step;
 };
 
 }  // namespace

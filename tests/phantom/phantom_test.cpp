@@ -6,10 +6,12 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
+#include <algorithm>
 
 #include "common/error.h"
 #include "meshing/surface/triangle_tree.h"
 #include "meshing/topology.h"
+#include "phantom/volunteers.h"
 #include "phantom/voxels.h"
 #include "simulation/catalogue.h"
 #include "simulation/mechanics.h"
@@ -82,6 +84,33 @@ TEST(Body, VolunteersLieInTheirRangesAndAreOtherBodies) {
   }
   EXPECT_LT(lowest, 55);
   EXPECT_GT(highest, 100);
+}
+
+TEST(Volunteers, NipplesAreToMoveAsFarAsMeasuredOnes) {
+  constexpr std::uint64_t draws = 2000;
+  std::vector<double> way;
+  for (std::uint64_t seed = 1; seed <= draws; ++seed) way.push_back(draw_volunteer(seed).nipple_moves_mm);
+  std::sort(way.begin(), way.end());
+  // 63 volunteers; the error of a median of 2000 is 0.8 mm.
+  EXPECT_NEAR(way[draws / 4], 80, 3);
+  EXPECT_NEAR(way[draws / 2], 96, 3);
+  EXPECT_NEAR(way[3 * draws / 4], 118, 4);
+}
+
+TEST(Volunteers, ModuliAreScaledUntilTheNippleMovesAsFarAsDrawn) {
+  int reached = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    PhantomOptions options = coarse(seed);
+    options.population = Population::volunteers;
+    const Phantom made = make_phantom(options);
+    const double off = std::abs(made.motion.nipple_mm.norm() / made.body.nipple_moves_mm - 1);
+    reached += off <= 0.03;
+    EXPECT_TRUE(off <= 0.03 || !made.gave_way.empty()) << "seed " << seed << " is off by " << off << " and says nothing";
+    EXPECT_GE(made.body.breast_kpa, softest_breast_kpa) << "seed " << seed;
+    EXPECT_GE(made.body.skin_kpa, softest_skin_kpa) << "seed " << seed;
+    EXPECT_EQ(made.body.height_mm, draw_volunteer(seed).height_mm);
+  }
+  EXPECT_GE(reached, 3);
 }
 
 TEST(Motion, IsThatOfAShiftedAndTurnedBody) {
