@@ -97,8 +97,8 @@ std::vector<fs::path> measurements(const Case& measured) {
   return files;
 }
 
-/// Where a file may lie that goes by this name in the provenance of @p tool: in folders of our own, whose names are
-/// theirs alone, or as a measurement of the case.
+/// Where a file may lie that goes by this name in the provenance of @p tool: in folders of our own, or as a measurement
+/// of the case (landmarks that were measured may be called as those that are predicted).
 std::vector<fs::path> places_of(const std::string& name, const std::string& tool, const std::string& sidecar,
                                 const Case& measured, const Places& places) {
   std::vector<fs::path> found;
@@ -106,7 +106,7 @@ std::vector<fs::path> places_of(const std::string& name, const std::string& tool
   if (name == "model.toml")
     found = {places.case_folder / name, (lies_in_case(name, tool) ? places.case_folder : places.out) / name};
   else if (const std::string end = fs::path(name).extension().string();
-           end == ".vtu" || end == ".vtp" || end == ".vti") {
+           end == ".vtu" || end == ".vtp" || end == ".vti" || end == ".csv") {
     const fs::path beside = places.out / fs::path(sidecar).parent_path() / name;
     found = {fs::exists(beside) ? beside : places.out / name};
   }

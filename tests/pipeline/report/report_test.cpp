@@ -220,6 +220,26 @@ TEST(ReportStages, AnInputThatWasWrittenAgainMakesItsResultStale) {
   expect_words(stage(stages_of(measured_case(), collected, here), "simulate").stale, {"supine.json", "mesh.vtu"});
 }
 
+TEST(ReportStages, LandmarksThatWereMeasuredMayBeCalledAsThoseThatArePredicted) {
+  const TemporaryFolder folder;
+  const std::string of_abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad",  // FIPS 180-2
+      of_nothing = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
+  write_text(folder / "supine_landmarks.csv", "abc");
+  write_text(folder / "out/supine_landmarks.csv", "");
+  Case measured = measured_case();
+  measured.poses[1].landmarks = folder / "supine_landmarks.csv";
+  Collected collected;
+  collected.figures["comparison.json"]["provenance"] = {{"tool", "supine-compare"},
+                                                        {"inputs",
+                                                         {{{"file", "supine_landmarks.csv"}, {"sha256", of_abc}},
+                                                          {{"file", "supine_landmarks.csv"}, {"sha256", of_nothing}}}}};
+  const Places here = {folder.path(), folder / "out", "c", "c/out"};
+  EXPECT_EQ(stage(stages_of(measured, collected, here), "compare").stale, "");
+  write_text(folder / "out/supine_landmarks.csv", "predicted anew");
+  expect_words(stage(stages_of(measured, collected, here), "compare").stale,
+               {"comparison.json", "another supine_landmarks.csv"});
+}
+
 TEST(ReportStages, AScanThatWasMovedSinceAndAnotherGravityMakeStaleToo) {
   const TemporaryFolder folder;
   write_text(folder / "supine.ply", "abcd");
