@@ -38,6 +38,7 @@ class Search {
         return solve(factor_, Truth::Start::no_load);
       } catch (const NumericalFailure& failure) {
         phantom_.gave_way.push_back(failure.what());
+        followed_below_ = factor_;
         if (tried == stiffer_tries) throw;
       }
   }
@@ -54,7 +55,7 @@ class Search {
     }
     const double before = factor_, moved = moved_;
     try {
-      solve(next, Truth::Start::shapes);
+      solve_near(next);
     } catch (const NumericalFailure& failure) {
       phantom_.gave_way.push_back(failure.what());
       longest_ = std::sqrt(longest_);
@@ -62,6 +63,17 @@ class Search {
     }
     slope_ = std::clamp(std::log(moved_ / moved) / std::log(factor_ / before), steepest, flattest);
     return true;
+  }
+
+  /// From no load, as a simulation of the case finds it: shapes that are followed may lead to another equilibrium.
+  /// Where that fails, and with what is softer still, they are followed.
+  void solve_near(double factor) {
+    if (factor > followed_below_) try {
+        return solve(factor, Truth::Start::no_load);
+      } catch (const NumericalFailure&) {
+        followed_below_ = factor;
+      }
+    solve(factor, Truth::Start::shapes);
   }
 
   /// A factor beyond which both moduli stay at the ends of their ranges is none.
@@ -98,7 +110,7 @@ class Search {
   const PhantomOptions& options_;
   Phantom& phantom_;
   Body drawn_;
-  double factor_ = 1, carried_ = 1, moved_ = 0, slope_ = usual_slope, longest_ = longest_step;
+  double factor_ = 1, carried_ = 1, followed_below_ = 0, moved_ = 0, slope_ = usual_slope, longest_ = longest_step;
 };
 
 }  // namespace

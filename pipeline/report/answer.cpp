@@ -154,6 +154,11 @@ void add_facts(const Json& diagnosis, const Collected& collected, const char* bo
                                        diagnosis["unexplained95"][0].get<double>(),
                                        diagnosis["unexplained95"][1].get<double>()));
   for (const Json& place : diagnosis.value("registration", Json::array())) answer.facts.push_back(place_of_scan(place));
+  if (const Json& fit = collected.find("calibration.json"); fit.is_object() && fit.contains("as_given"))
+    answer.facts.push_back(fmt::format(
+        "With the scans there, and gravity, breath and the rest as they were found, the calibrated model is {:.2f} mm "
+        "off (RMS over what was fitted) in place of {:.2f}.",
+        number(fit, "rms_mm"), number(fit["as_given"], "rms_mm")));
   if (const double creased = number(diagnosis, "creased_points"); creased > 0)
     answer.facts.push_back(
         fmt::format("{:.0f} points of the scans lie where the model's skin creases; they count for little.", creased));

@@ -105,7 +105,8 @@ TEST(Volunteers, ModuliAreScaledUntilTheNippleMovesAsFarAsDrawn) {
     const Phantom made = make_phantom(options);
     const double off = std::abs(made.motion.nipple_mm.norm() / made.body.nipple_moves_mm - 1);
     reached += off <= 0.03;
-    EXPECT_TRUE(off <= 0.03 || !made.gave_way.empty()) << "seed " << seed << " is off by " << off << " and says nothing";
+    EXPECT_TRUE(off <= 0.03 || !made.gave_way.empty())
+        << "seed " << seed << " is off by " << off << " and says nothing";
     EXPECT_GE(made.body.breast_kpa, softest_breast_kpa) << "seed " << seed;
     EXPECT_GE(made.body.skin_kpa, softest_skin_kpa) << "seed " << seed;
     EXPECT_EQ(made.body.height_mm, draw_volunteer(seed).height_mm);

@@ -295,6 +295,21 @@ TEST(ReportAnswer, SaysWhenNothingIsMissing) {
   EXPECT_EQ(answer.command, "");
 }
 
+TEST(ReportAnswer, SaysHowFarOffTheModelIsWhereTheScansWereFoundToLie) {
+  Collected collected;
+  collected.figures["diagnosis.json"] = {
+      {"verdict", "nothing_missing"}, {"missing", Json::array()}, {"why", "it fits"}};
+  collected.figures["calibration.json"] = {{"rms_mm", 0.951}, {"as_given", {{"rms_mm", 1.282}}}};
+  const auto said = [&collected] {
+    std::string all;
+    for (const std::string& fact : answer_of(measured_case(), collected, {}, places).facts) all += fact + "\n";
+    return all;
+  };
+  expect_words(said(), {"With the scans there", "0.95 mm off", "in place of 1.28"});
+  collected.figures["calibration.json"].erase("as_given");
+  EXPECT_EQ(said().find("With the scans there"), std::string::npos);
+}
+
 TEST(ReportAnswer, AnAmbiguousSetComesWithTheMeasurementThatSplitsIt) {
   const Answer answer =
       answered({{"verdict", "ambiguous"},
