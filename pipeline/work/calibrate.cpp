@@ -287,8 +287,8 @@ struct CalibrateOptions::Use {
   bool given;
   const char* option;
   std::vector<std::string> methods;
-  bool by(const std::string& method) const {
-    return std::find(methods.begin(), methods.end(), method) != methods.end();
+  bool by(const std::string& name) const {
+    return std::find(methods.begin(), methods.end(), name) != methods.end();
   }
 };
 
