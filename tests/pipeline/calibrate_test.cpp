@@ -223,6 +223,24 @@ TEST_F(Calibrate, SaysHowFarTheModelIsOffWhereScansLieAsGiven) {
   EXPECT_LT(result["rms_mm"].get<double>(), compared);
 }
 
+TEST_F(Calibrate, NamesWhatIsNeverKnownAndHadToMoveTooFar) {
+  const auto warned = [this](const char* to) {
+    const Finished finished = run("calibrate", to, {"--method", "joint"});
+    EXPECT_LE(finished.code, 1) << finished.err;
+    return finished.err.find("sigma from where it is expected: it makes up for something else") != std::string::npos;
+  };
+  EXPECT_FALSE(warned("in_place"));
+  // A scan 5 mm from where it is said to lie to a tenth of a millimetre.
+  std::string text = bytes("case.toml");
+  text.insert(text.find("surface"), "registration_mm = 0.1\n");
+  write_text(folder() / "case.toml", text);
+  write_scan(folder() / "supine.ply", [](std::array<double, 3> p) {
+    p[1] += 5;
+    return p;
+  });
+  EXPECT_TRUE(warned("elsewhere"));
+}
+
 TEST_F(Calibrate, TakesLeastSquaresBesideAnOptionThatOnlyItKnows) {
   ASSERT_LE(run("calibrate", "robust", {"--robust", "3"}).code, 1);
   const Json chosen = json("robust/calibration.json");
