@@ -287,9 +287,7 @@ struct CalibrateOptions::Use {
   bool given;
   const char* option;
   std::vector<std::string> methods;
-  bool by(const std::string& name) const {
-    return std::find(methods.begin(), methods.end(), name) != methods.end();
-  }
+  bool by(const std::string& name) const { return std::find(methods.begin(), methods.end(), name) != methods.end(); }
 };
 
 std::vector<CalibrateOptions::Use> CalibrateOptions::uses() const {
