@@ -356,7 +356,7 @@ TEST_F(Calibrate, DiagnosisAsksTheWholeCatalogue) {
   int refitted = 0;
   for (const Json& candidate : result["candidates"]) refitted += !candidate["refit_rms_mm"].is_null();
   EXPECT_GE(refitted, 1);
-  EXPECT_LE(refitted, 18) << "where lines bend, six times --refit, sets of three at most";
+  EXPECT_LT(refitted, static_cast<int>(result["candidates"].size())) << "six times --refit sets at the most";
 }
 
 TEST_F(Calibrate, MakeGoesFromTheMeshToTheDiagnosisAndRunsNothingTwice) {
