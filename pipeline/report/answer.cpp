@@ -156,8 +156,8 @@ void add_facts(const Json& diagnosis, const Collected& collected, const char* bo
   for (const Json& place : diagnosis.value("registration", Json::array())) answer.facts.push_back(place_of_scan(place));
   if (const Json& fit = collected.find("calibration.json"); fit.is_object() && fit.contains("as_given"))
     answer.facts.push_back(fmt::format(
-        "With the scans there, and gravity, breath and the rest as they were found, the calibrated model is {:.2f} mm "
-        "off (RMS over what was fitted) in place of {:.2f}.",
+        "With the scans there, and everything else as it was found, the calibrated model is {:.2f} mm off (RMS over "
+        "what was fitted) in place of {:.2f}.",
         number(fit, "rms_mm"), number(fit["as_given"], "rms_mm")));
   if (const double creased = number(diagnosis, "creased_points"); creased > 0)
     answer.facts.push_back(
