@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "pipeline/tool/runtime_settings.h"
 
+#include <malloc.h>
 #include <omp.h>
 #include <unistd.h>
 
@@ -34,6 +35,12 @@ bool shorten_spinning() {
 }
 
 }  // namespace
+
+void keep_freed_memory() {
+  constexpr int never = 0, most = 1 << 30;
+  mallopt(M_MMAP_MAX, never);
+  mallopt(M_TRIM_THRESHOLD, most);
+}
 
 /// Parallelism is that of our own loops; BLAS on one thread keeps results identical for any thread count.
 int use_threads(int wanted) {

@@ -13,6 +13,10 @@ namespace supine::pipeline {
 /// machine then hold each other up, measured: more than ten times. A thousand turns (microseconds) cost nothing alone.
 void use_fitting_settings(char** argv);
 
+/// Has freed memory kept for the next request: factors of many megabytes come and go with every Newton step, and pages
+/// that the system hands out anew have to be cleared first.
+void keep_freed_memory();
+
 /// Has the loops of the libraries run on that many threads, 0 = all, and BLAS on one. @return  the number
 int use_threads(int wanted);
 

@@ -94,6 +94,7 @@ CLI::Validator within(double lower, double upper) {
 
 int tool_main(Tool& tool, int argc, char** argv) {
   use_fitting_settings(argv);
+  keep_freed_memory();
   install_interrupt_handler();
   std::signal(SIGXFSZ, SIG_IGN);  // a file larger than ulimit -f allows: the write fails, and is told as one that does
   CLI::App app(tool.summary(), tool.name());
