@@ -74,7 +74,7 @@ def main():
         scan = vtk_to_numpy(read(vtk.vtkPLYReader(), f"{case}/supine.ply").GetPoints().GetData())[::15].astype(float)
         folder = asked.work / case.strip("/").replace("/", "_")
         given, refined, fine = (
-            distances(supine(asked.bin.resolve(), case, model or f"{case}/model.toml", folder / triangles, end), scan)
+            distances(supine(asked.bin.resolve(), case, model or f"{case}/model.toml", folder / triangles, triangles, end), scan)
             for triangles, end in ((COARSE, False), (COARSE, True), (FINE, True)))
         near = abs(given) < 8  # mm: over the skin
         error, shown = (given - fine)[near], (given - refined)[near]
