@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 #
 #   make demo                        install what is missing, build, take the sample from its MRI to the report
-#   make test [LONG=ON] [DATA=dir]   the same set-up, then every test but those of 15 s and more, with LONG=ON these too; DATA: docs/data.md
+#   make test [LONG=ON] [DATA=dir]   the same set-up, then the tests, with LONG=ON also those that tests/long.txt names; DATA: docs/data.md
 #   make CASE=dir [OUT=dir] [stage]  run a case: segment reconstruct decimate mesh simulate compare, or as far as its data allow;
 #                                    then calibrate, diagnose, ladder, sensitivity, targets, warp; report: one page of what is there
 #   make COHORT=dir [TARGET=stage] [OUT=dir] [PROFILE=cohort/slurm]
@@ -88,7 +88,7 @@ package: tools
 package-test: package
 	@tests/package/package_test.sh $(BUILD)/package $(BUILD)/package-test
 
-# Tests of 15 s and more, named in tests/long.txt: OFF leaves them out, ON runs them too, ONLY nothing else.
+# Long tests, named in tests/long.txt: OFF leaves them out, ON runs them too, ONLY nothing else.
 LONG ?= OFF
 long_tests = "^($$(paste -sd'|' tests/long.txt))$$"
 test: build

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""How much of a coarse mesh's error half the edge at the skin's end shows: both against a fine mesh, at the points of the
-supine scan. Needs the Python VTK (python3-vtk9)."""
+"""How much of a coarse mesh's error half the edge at the skin's end shows: both against a fine mesh, at the points of
+the supine scan. Needs the Python VTK (python3-vtk9)."""
 
 import argparse
 import os
@@ -74,7 +74,8 @@ def main():
         scan = vtk_to_numpy(read(vtk.vtkPLYReader(), f"{case}/supine.ply").GetPoints().GetData())[::15].astype(float)
         folder = asked.work / case.strip("/").replace("/", "_")
         given, refined, fine = (
-            distances(supine(asked.bin.resolve(), case, model or f"{case}/model.toml", folder / triangles, triangles, end), scan)
+            distances(supine(asked.bin.resolve(), case, model or f"{case}/model.toml", folder / triangles, triangles,
+                             end), scan)
             for triangles, end in ((COARSE, False), (COARSE, True), (FINE, True)))
         near = abs(given) < 8  # mm: over the skin
         error, shown = (given - fine)[near], (given - refined)[near]

@@ -14,7 +14,7 @@ namespace supine::pipeline {
 void use_fitting_settings(char** argv);
 
 /// Has freed memory kept for the next request: factors of many megabytes come and go with every Newton step, and pages
-/// that the system hands out anew have to be cleared first.
+/// that the system hands out anew have to be cleared first. Costs a quarter more memory, saves a fifth of a diagnosis.
 void keep_freed_memory();
 
 /// Has the loops of the libraries run on that many threads, 0 = all, and BLAS on one. @return  the number
