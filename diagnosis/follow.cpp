@@ -42,19 +42,16 @@ class Follower {
   void run() {
     if (options_.refits > 0) look_from_usual_sizes();
     if (options_.refits > 0) follow_expected();
-    auto most = static_cast<std::size_t>(options_.refits);
-    if (!something_stands_out(found_)) most = std::min(most, refits_when_quiet);
-    for (std::size_t simpler = 0; !bent_ && !(first_holds_an_effect() && found_.hypotheses.front().refitted);) {
-      const Hypothesis* next = found_.refits.size() < most ? next_to_refit(found_.hypotheses) : nullptr;
-      if (next == nullptr && most > 0 && simpler < most_simpler)
-        next = simpler_than_first(found_.hypotheses), ++simpler;
-      if (next == nullptr) break;
-      follow_one(next->effects);
+    explore();
+    if (settle_strengths()) {
+      explore();
+      settle_strengths();
     }
-    if (!bent_ && most > 0) on_from_first();
-    if (bent_) one_at_a_time();
-    for (std::vector<int> part = surest_part(found_); most > 0 && !part.empty(); part = surest_part(found_))
+    for (std::vector<int> part = surest_part(found_); options_.refits > 0 && !part.empty();
+         part = surest_part(found_)) {
       if (!look_again_beside(part)) break;
+      settle_strengths();
+    }
   }
 
  private:
@@ -80,15 +77,6 @@ class Follower {
                           found_.hypotheses);
   }
 
-  /// Of prior and evidence under some errors: a set with less is too unlikely to be asked for more.
-  double least_worth(const BaseFit& ground) const {
-    constexpr double hopeless = 10;
-    double most = -std::numeric_limits<double>::infinity();
-    for (const Hypothesis& h : found_.hypotheses)
-      if (h.refitted && h.ground == &ground) most = std::max(most, h.ln_prior + h.ln_evidence);
-    return most - hopeless;
-  }
-
   bool first_holds_an_effect() const { return !found_.hypotheses.front().effects.empty(); }
 
   void weigh() {
@@ -98,13 +86,56 @@ class Follower {
     normalise(found_.hypotheses);
   }
 
+  /// What is screened as likely is followed, then what lines from there promise.
+  void explore() {
+    auto most = static_cast<std::size_t>(options_.refits);
+    if (!something_stands_out(found_)) most = std::min(most, refits_when_quiet);
+    for (std::size_t simpler = 0; !bent_ && !(first_holds_an_effect() && found_.hypotheses.front().refitted);) {
+      const Hypothesis* next = found_.refits.size() < most ? next_to_refit(found_.hypotheses) : nullptr;
+      if (next == nullptr && most > 0 && simpler < most_simpler)
+        next = simpler_than_first(found_.hypotheses), ++simpler;
+      if (next == nullptr) break;
+      follow_one(next->effects);
+    }
+    if (!bent_ && most > 0) on_from_first();
+    if (bent_) one_at_a_time();
+  }
+
+  /// The likeliest refit whose strengths are not settled yet, of those that are likely; the number of refits where
+  /// there is none.
+  std::size_t next_to_settle() const {
+    for (const Hypothesis& h : found_.hypotheses) {
+      if (h.probability < worth_refitting) break;
+      for (std::size_t r = 0; r < found_.refits.size(); ++r)
+        if (const Refit& refit = found_.refits[r];
+            refit.solved && !refit.has_densities && refit.hypothesis.effects == h.effects)
+          return r;
+    }
+    return found_.refits.size();
+  }
+
+  /// Strengths that are far from linear, of every set that is likely. @return  whether another set is the likeliest
+  /// since
+  bool settle_strengths() {
+    const std::vector<int> first = found_.hypotheses.front().effects;
+    for (std::size_t at = next_to_settle(); at < found_.refits.size(); at = next_to_settle()) {
+      Refit& refit = found_.refits[at];
+      tell("strengths of", refit.hypothesis.effects);
+      const double gain = find_strength_densities(subject_.scene, found_.candidates, refit);
+      if (gain == 0) continue;
+      hypothesis_of(found_, refit.hypothesis.effects).ln_evidence += gain;
+      for (Hypothesis& h : found_.hypotheses)
+        if (is_open(h) && h.drawn_at == static_cast<int>(at)) h.screened += gain, h.ln_evidence += gain;
+      weigh();
+    }
+    return found_.hypotheses.front().effects != first;
+  }
+
   void follow_one(const std::vector<int> effects) {
     tell("refit with", effects);
     Hypothesis& h = hypothesis_of(found_, effects);
     const JointFit& from = h.drawn_at < 0 ? found_.base : found_.refits[static_cast<std::size_t>(h.drawn_at)].joint;
-    const BaseFit& ground = ground_of(effects);
-    Refit refit =
-        diagnosis::refit(subject_.scene, subject_.given, ground, from, found_.candidates, h, least_worth(ground));
+    Refit refit = diagnosis::refit(subject_.scene, subject_.given, ground_of(effects), from, found_.candidates, h);
     if (refit.solved) {
       const double promised = h.screened;
       h = refit.hypothesis;
@@ -291,7 +322,7 @@ class Follower {
       Hypothesis& h = hypothesis_of(found_, effects);
       if (h.probability >= worth_refitting) {
         tell("again with", effects);
-        refit = refit_again(subject_.scene, ground, refit, found_.candidates, least_worth(ground));
+        refit = refit_again(subject_.scene, ground, refit);
         h = refit.hypothesis;
       } else {
         refit.solved = false;
@@ -320,8 +351,7 @@ class Follower {
     } catch (const NumericalFailure&) {
       return false;  // those of the base fit have to do
     }
-    Refit again = refit_again(subject_.scene, *beside.ground, found_.refits[at], found_.candidates,
-                              -std::numeric_limits<double>::infinity());
+    Refit again = refit_again(subject_.scene, *beside.ground, found_.refits[at]);
     if (!again.solved) return false;  // nor can what holds it be weighed under these
     hypothesis_of(found_, part) = again.hypothesis;
     found_.refits[at] = std::move(again);

@@ -24,6 +24,7 @@ using Eigen::VectorXd;
 
 constexpr double far = 1;        // of a nuisance, in sigma: its shape holds no more
 constexpr double misplaced = 2;  // the same: a fit that has it there is no place to begin
+constexpr double far_off_mm = 5;  // with nothing moved: closest points are other ones there
 constexpr int most_joint_steps = 8;
 
 double offset_of(const Hypothesis& h, const std::string& name) {
@@ -172,9 +173,19 @@ void fit_set(const calibration::MeasuredScene& scene, const BaseFit& base, const
   weigh_at(base, joint, h);
 }
 
-/// The same with nothing moved and effects at their usual size. @return  whether that has an equilibrium
-bool fit_afresh(const calibration::MeasuredScene& scene, const BaseFit& base, Hypothesis& h, JointFit& joint) {
-  for (Nuisance& nuisance : joint.nuisances) nuisance.value = 0;
+/// How far off a fit would lie with nothing moved, rms of its points of skin, to first order.
+double unmoved_rms_mm(const JointFit& fit) {
+  VectorXd distance = fit.fit.residuals.distance_mm;
+  for (const Nuisance& nuisance : fit.nuisances) distance -= nuisance.value * nuisance.shape_mm;
+  return rms(distance.head(fit.fit.residuals.skin_rows()));
+}
+
+/// The same with effects at their usual size and nothing moved, but of a scan that lies far off. @return  whether that
+/// has an equilibrium
+bool fit_afresh(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& from, Hypothesis& h,
+                JointFit& joint) {
+  if (unmoved_rms_mm(from) < far_off_mm)
+    for (Nuisance& nuisance : joint.nuisances) nuisance.value = 0;
   try {
     fit_jointly(scene, base, {joint.parameters->start(), joint.nuisances}, nullptr, 2 * most_joint_steps, joint, h);
     return true;
@@ -194,7 +205,7 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
               const std::vector<Candidate>& candidates, const Hypothesis& screened, Refit& result) {
   const JointFit unfitted = result.joint;
   Hypothesis& h = result.hypothesis = screened;
-  if (screened.from_usual && fit_afresh(scene, base, h, result.joint)) return result.solved = true;
+  if (screened.from_usual && fit_afresh(scene, base, from, h, result.joint)) return result.solved = true;
   if (screened.from_usual) result.joint = unfitted, h = screened;
   try {
     const VectorXd start = start_of(*unfitted.parameters, from, candidates, screened);
@@ -208,7 +219,7 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
   if (screened.drawn_at < 0 && !bent && !is_misplaced(from)) return result.solved;
   JointFit other = unfitted;
   Hypothesis afresh = screened;
-  if (fit_afresh(scene, base, afresh, other) && (!result.solved || afresh.ln_evidence > h.ln_evidence)) {
+  if (fit_afresh(scene, base, from, afresh, other) && (!result.solved || afresh.ln_evidence > h.ln_evidence)) {
     result.joint = std::move(other);
     h = std::move(afresh);
     result.solved = true;
@@ -216,17 +227,11 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
   return result.solved;
 }
 
-/// Fills what a fit says of its set.
-void tell_of(const calibration::MeasuredScene& scene, const BaseFit& base, const std::vector<Candidate>& candidates,
-             double least, Refit& result) {
+/// Fills what a fit says of its set, by Laplace.
+void tell_of(const BaseFit& base, Refit& result) {
   const JointFit& joint = result.joint;
-  const FreeParameters there(with_nuisances(joint.parameters->base(), joint.nuisances, poses_of(scene)));
-  const FitErrors errors(base, joint.nuisances, joint.size_mm);
-  Curved curved;
-  if (result.hypothesis.ln_prior + result.hypothesis.ln_evidence >= least)
-    curved = curved_strengths({scene, base, errors.metric(), joint.nuisances}, candidates, there, result);
   result.model = joint.parameters->model(joint.fit.u);
-  result.parameters = parameters_of(result, there, curved);
+  result.parameters = parameters_of(result, *joint.parameters, {});
   result.at_border = is_at_border(result.parameters);
   result.rms_mm =
       rms(distances_at_posterior(base, result.hypothesis, joint.fit.residuals).head(joint.fit.residuals.skin_rows()));
@@ -236,18 +241,17 @@ void tell_of(const calibration::MeasuredScene& scene, const BaseFit& base, const
 }  // namespace
 
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
-            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened, double least) {
+            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened) {
   Refit result;
   for (const int effect : screened.effects)
     result.effects.push_back(candidates[static_cast<std::size_t>(effect)].effect);
   result.joint = unfitted(given, base, from, result.effects);
   result.joint.size_mm = base.size_of(screened.weighed);
-  if (find_fit(scene, base, from, candidates, screened, result)) tell_of(scene, base, candidates, least, result);
+  if (find_fit(scene, base, from, candidates, screened, result)) tell_of(base, result);
   return result;
 }
 
-Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground, const Refit& before,
-                  const std::vector<Candidate>& candidates, double least) {
+Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground, const Refit& before) {
   Refit result;
   result.effects = before.effects;
   result.joint = before.joint;
@@ -260,8 +264,22 @@ Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground
   }
   result.hypothesis.again = true;
   result.hypothesis.screened = result.hypothesis.ln_evidence;
-  tell_of(scene, ground, candidates, least, result);
+  tell_of(ground, result);
   return result;
+}
+
+double find_strength_densities(const calibration::MeasuredScene& scene, const std::vector<Candidate>& candidates,
+                               Refit& refit) {
+  if (!refit.solved || refit.has_densities) return 0;
+  refit.has_densities = true;
+  const BaseFit& ground = *refit.hypothesis.ground;
+  const JointFit& joint = refit.joint;
+  const FreeParameters there(with_nuisances(joint.parameters->base(), joint.nuisances, poses_of(scene)));
+  const FitErrors errors(ground, joint.nuisances, joint.size_mm);
+  const double before = refit.hypothesis.ln_evidence;
+  const Curved curved = curved_strengths({scene, ground, errors.metric(), joint.nuisances}, candidates, there, refit);
+  if (!curved.empty()) refit.parameters = parameters_of(refit, there, curved);
+  return refit.hypothesis.ln_evidence - before;
 }
 
 }  // namespace supine::diagnosis

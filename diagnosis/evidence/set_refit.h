@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -27,6 +26,7 @@ struct FittedParameter {
 struct Refit {
   std::vector<std::string> effects;
   bool solved = false;                      ///< whether the chain found an equilibrium; nothing below holds otherwise
+  bool has_densities = false;               ///< find_strength_densities()
   bool at_border = false;                   ///< whether a place or width ended at the border of its range
   double rms_mm = 0, held_out_rms_mm = 0;   ///< fitted points; every block of skin without itself
   std::vector<FittedParameter> parameters;  ///< of the effects
@@ -41,19 +41,23 @@ struct Refit {
 /// deviation from where it stood, its shape holds no more: then they are fitted as well (joint_fit.h). Laplace's
 /// evidence there for every size.
 ///
-/// A second fit begins with effects at their usual size and nothing moved, and the likelier of both is kept, where the
+/// A second fit begins with effects at their usual size and nothing moved (where that would not leave scans centimetres
+/// off), and the likelier of both is kept, where the
 /// first ends far from what lines promise, where @p screened was drawn from a refit, and where @p from had to move what
 /// is never known by more than two standard deviations: a strength that begins near zero may stay there.
 /// One whose lines are those of its usual size begins there at once.
 /// @param given     the base model: where its priors stand
 /// @param from      the fit at which @p screened was drawn: the base fit, or a refit of a part of the set
-/// @param least     ln of prior and evidence of a set so unlikely that nobody will ask for the density of its strength
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
-            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened,
-            double least = -std::numeric_limits<double>::infinity());
+            const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened);
 
 /// Follows a set once more from where it was followed before, under the errors of @p ground.
-Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground, const Refit& before,
-                  const std::vector<Candidate>& candidates, double least);
+Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground, const Refit& before);
+
+/// Where an effect of the refit is far from linear in its strength: the density of it, which its interval and the
+/// evidence are taken from then (strength_profile.h). Many chain solves: for what is likely; once.
+/// @return  what the logarithm of the evidence gains
+double find_strength_densities(const calibration::MeasuredScene& scene, const std::vector<Candidate>& candidates,
+                               Refit& refit);
 
 }  // namespace supine::diagnosis
