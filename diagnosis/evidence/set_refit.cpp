@@ -180,6 +180,14 @@ double unmoved_rms_mm(const JointFit& fit) {
   return rms(distance.head(fit.fit.residuals.skin_rows()));
 }
 
+bool is_misplaced(const JointFit& fit) {
+  return std::any_of(fit.nuisances.begin(), fit.nuisances.end(),
+                     [](const Nuisance& nuisance) { return std::abs(nuisance.value) > misplaced; });
+}
+
+/// Whether a fit may have moved what should stay, and begun with nothing moved may end elsewhere.
+bool may_be_misled(const JointFit& fit) { return is_misplaced(fit) && unmoved_rms_mm(fit) < far_off_mm; }
+
 /// The same with effects at their usual size and nothing moved, but of a scan that lies far off. @return  whether that
 /// has an equilibrium
 bool fit_afresh(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& from, Hypothesis& h,
@@ -192,11 +200,6 @@ bool fit_afresh(const calibration::MeasuredScene& scene, const BaseFit& base, co
   } catch (const NumericalFailure&) {
     return false;
   }
-}
-
-bool is_misplaced(const JointFit& fit) {
-  return std::any_of(fit.nuisances.begin(), fit.nuisances.end(),
-                     [](const Nuisance& nuisance) { return std::abs(nuisance.value) > misplaced; });
 }
 
 /// The likelier fit of the one that goes on from an earlier fit and, where lines did not lead there, one that begins
@@ -216,7 +219,7 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
     // No equilibrium where the screening has it.
   }
   const bool bent = result.solved && std::abs(screened.screened - h.ln_evidence) > lines_bend_at;
-  if (screened.drawn_at < 0 && !bent && !is_misplaced(from)) return result.solved;
+  if (screened.drawn_at < 0 && !bent && !may_be_misled(from)) return result.solved;
   JointFit other = unfitted;
   Hypothesis afresh = screened;
   if (fit_afresh(scene, base, from, afresh, other) && (!result.solved || afresh.ln_evidence > h.ln_evidence)) {

@@ -41,11 +41,11 @@ struct Refit {
 /// deviation from where it stood, its shape holds no more: then they are fitted as well (joint_fit.h). Laplace's
 /// evidence there for every size.
 ///
-/// A second fit begins with effects at their usual size and nothing moved (where that would not leave scans centimetres
-/// off), and the likelier of both is kept, where the
-/// first ends far from what lines promise, where @p screened was drawn from a refit, and where @p from had to move what
-/// is never known by more than two standard deviations: a strength that begins near zero may stay there.
-/// One whose lines are those of its usual size begins there at once.
+/// A second fit begins with effects at their usual size and nothing moved (but where scans would then lie centimetres
+/// off), and the likelier of both is kept, where the first ends far from what lines promise, where @p screened was
+/// drawn from a refit, and where @p from had to move what is never known by more than two standard deviations, less
+/// than centimetres: a strength that begins near zero may stay there. One whose lines are those of its usual size
+/// begins there at once.
 /// @param given     the base model: where its priors stand
 /// @param from      the fit at which @p screened was drawn: the base fit, or a refit of a part of the set
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
