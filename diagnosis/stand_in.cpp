@@ -66,7 +66,7 @@ class Imitation {
     WeightedFit fit;
     {
       // Of an effect that the case does not expect it is a figure beside the verdict: worth one solve from nothing.
-      const calibration::TrialLimit limit(evaluator.chain(), expected ? base_.dearest : base_.dearest / 3);
+      const calibration::TrialLimit limit(evaluator.chain(), expected ? 2 * base_.dearest : 2 * base_.dearest / 3);
       const simulation::ChainSolution start = near(candidate, size);
       fit = weigh(evaluator, there, metric_, start_of(there), &start);
     }

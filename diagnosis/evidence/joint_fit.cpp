@@ -121,8 +121,9 @@ void JointFitter::predict(const JointTrial& at, const simulation::ChainSolution*
     solve(evaluator_, poses_, at, near, ground_, fit_);
   if (!first) return;
   for (calibration::FitEvaluation& row : fit_.history) row.accepted = row.values == fit_.parameters->values(fit_.fit.u);
-  fit_.dearest = std::max(fit_.dearest, fit_.fit.prediction.solution.work);
-  if (near != nullptr) fit_.dearest = std::max(fit_.dearest, near->work);
+  // A trial goes on from shapes: worth half as much again as one from nothing (TrialLimit gives it three times this).
+  const int work = fit_.fit.prediction.solution.work;
+  fit_.dearest = std::max(fit_.dearest, near != nullptr ? std::max(work, near->work) : work / 2);
 }
 
 std::unique_ptr<simulation::Sensitivities> JointFitter::linearise() {
@@ -153,7 +154,7 @@ bool JointFitter::improve() {
   const double promised = before - objective_of(y + evidence.directions().columns * step, stepped(step));
   if (promised < settled) return false;
   const calibration::Fit kept = fit_.fit;
-  fit_.dearest = std::max(fit_.dearest, kept.prediction.solution.work);
+  if (fit_.dearest == 0) fit_.dearest = kept.prediction.solution.work;
   const simulation::Model kept_model = fit_.model;
   for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
     fit_.fit.u = kept.u, fit_.nuisances = now.nuisances;
@@ -164,6 +165,7 @@ bool JointFitter::improve() {
       predict(trial, &near);
       if (objective() < before) {
         ++fit_.steps;
+        fit_.dearest = std::max(fit_.dearest, fit_.fit.prediction.solution.work);
         if (fit_.keeps_history) fit_.history.back().accepted = true;
         return true;
       }

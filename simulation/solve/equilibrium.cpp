@@ -20,6 +20,7 @@ constexpr int quick_iterations = 8;        // a load step solved in so many is e
 constexpr double crushed_step_factor = 4;  // where elements are crushed, smaller load steps than this only repeat it
 constexpr double squeezed_det_f = 0.1;     // an element under this is the place to look at, not the worst balance
 // Newton steps.
+constexpr int cycles_per_step = 4;      // with what else belongs to a step and its factor
 constexpr double longest_step_mm = 40;  // a step beyond this is shortened before the line search
 // Line search.
 constexpr double sufficient_decrease = 1e-4;  // Armijo constant
@@ -70,6 +71,10 @@ std::string reason(Termination end, int iterations, double residual_share) {
   return "converged";
 }
 
+int steps_and_factors(int steps, const NewtonDirection& direction) {
+  return steps + work_of_factor * direction.factorisations();
+}
+
 }  // namespace
 
 EquilibriumSolver::EquilibriumSolver(const Mechanics& mechanics, SolveOptions options)
@@ -90,7 +95,9 @@ SolveReport EquilibriumSolver::inverse(const Points& x, Points& X, const std::st
   return solve(Unknown::undeformed, x, X, what, start);
 }
 
-int EquilibriumSolver::work() const { return steps_ + work_of_factor * direction_->factorisations(); }
+int EquilibriumSolver::work() const {
+  return steps_and_factors(steps_, *direction_) + direction_->cycles() / cycles_per_step;
+}
 
 /// What a solve is measured by.
 void EquilibriumSolver::begin(const Points& known, const std::string& what) {
@@ -98,7 +105,7 @@ void EquilibriumSolver::begin(const Points& known, const std::string& what) {
   weight_norm_ = sums_.residual.norm();
   // A body that floats has no weight to compare with: it is balanced where only rounding is left.
   if (weight_norm_ < rounding_mn) weight_norm_ = rounding_mn / std::max(options_.residual_tolerance, 1e-16);
-  solve_end_ = std::min(work_end_, work() + options_.most_work);
+  solve_end_ = steps_and_factors(steps_, *direction_) + options_.most_work;
   what_ = what;
 }
 
@@ -253,7 +260,7 @@ std::optional<Termination> EquilibriumSolver::settled(Attempt& attempt, bool by_
     return Termination::step_small;
   if (creeps(attempt, by_energy)) return Termination::stalled;
   if (attempt.iterations == options_.max_iterations) return Termination::iteration_limit;
-  if (work() >= solve_end_) return Termination::work_limit;
+  if (steps_and_factors(steps_, *direction_) >= solve_end_ || work() >= work_end_) return Termination::work_limit;
   return std::nullopt;
 }
 

@@ -110,8 +110,8 @@ class EquilibriumSolver {
   /// Parameters and errors as of forward(), with x and X changing places.
   SolveReport inverse(const Points& x, Points& X, const std::string& what, const Points* start = nullptr);
 
-  /// What was spent since the object was made, failed load steps included: Newton steps, and for each factorisation
-  /// work_of_factor more. Counted, not timed, so that it is the same on every machine.
+  /// What was spent since the object was made, failed load steps included: Newton steps, work_of_factor more for each
+  /// factorisation, and Krylov iterations at what they take. Counted, not timed: the same on every machine.
   int work() const;
   /// What solves from now on may cost together, beside SolveOptions::most_work of each; beyond it they end with
   /// NoEquilibrium. Until it is called again; nullopt = no such bound.

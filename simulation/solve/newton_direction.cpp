@@ -203,6 +203,7 @@ bool NewtonDirection::by_conjugate_gradients(double tolerance, double shift, int
   if (factor_->direct()) options.worthwhile_reduction = worth_reduction;
   const KrylovReport report =
       krylov_.conjugate_gradients(matrix, preconditioner, -sums.residual, options, step, &bend_);
+  if (cycling()) cycles_ += report.iterations;
   renew_factor_ = report.iterations > max_iterations / 2;  // the factor is kept for as long as it is clearly cheaper
   indefinite_ = report.negative_curvature;
   exact_ = !indefinite_;
@@ -219,6 +220,7 @@ bool NewtonDirection::by_gmres(const SparseMatrix& matrix, const LinearMap& prec
   const auto product = [&matrix](const Eigen::VectorXd& in, Eigen::VectorXd& out) { out.noalias() = matrix * in; };
   const KrylovOptions options{.tolerance = tolerance, .max_iterations = max_gmres};
   const KrylovReport report = krylov_.gmres(product, preconditioner, -sums.residual, options, step);
+  if (cycling()) cycles_ += report.iterations;
   renew_factor_ = report.iterations > iterations_per_factor(least_gmres, max_gmres);
   return report.reduction < usable_reduction && step.allFinite();
 }

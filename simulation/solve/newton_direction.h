@@ -50,6 +50,8 @@ class NewtonDirection {
   bool exact() const { return exact_; }
   /// How many there were since the object was made, those that failed included.
   int factorisations() const { return factorisations_; }
+  /// The same of Krylov iterations with a cycle of multigrid; beside a factor they cost little.
+  int cycles() const { return cycles_; }
 
  private:
   bool factorise(const State& state, double tolerance, bool close, Sums& sums, Eigen::VectorXd* step);
@@ -80,6 +82,7 @@ class NewtonDirection {
   double shift_ = 0;            // of the tangent that was factorised last when the exact one was not positive definite
   bool cycle_failed_ = false;   // p-multigrid did not come to a solution: not tried again
   int factorisations_ = 0;
+  int cycles_ = 0;
 };
 
 }  // namespace supine::simulation
