@@ -22,8 +22,8 @@ using calibration::FreeParameters;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double far = 1;        // of a nuisance, in sigma: its shape holds no more
-constexpr double misplaced = 2;  // the same: a fit that has it there is no place to begin
+constexpr double far = 1;         // of a nuisance, in sigma: its shape holds no more
+constexpr double misplaced = 2;   // the same: a fit that has it there is no place to begin
 constexpr double far_off_mm = 5;  // with nothing moved: closest points are other ones there
 constexpr int most_joint_steps = 8;
 

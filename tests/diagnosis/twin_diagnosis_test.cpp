@@ -259,12 +259,17 @@ TEST(TwinDiagnosis, LinesFromItsUsualSizeShowMoreOfALigamentThanLinesFromNothing
   EXPECT_TRUE(after.from_usual);
   EXPECT_FALSE(after.refitted);
   EXPECT_GT(after.probability, before.probability);
-  const Refit followed = refit(subject.scene, subject.given, found->base, found->base, found->candidates, after);
+  Refit followed = refit(subject.scene, subject.given, found->base, found->base, found->candidates, after);
   ASSERT_TRUE(followed.solved);
   EXPECT_LT(std::abs(after.ln_evidence - followed.hypothesis.ln_evidence),
             0.5 * std::abs(before.ln_evidence - followed.hypothesis.ln_evidence));
   // Laplace's formula and the curve of the strength tell of one body: no end of the curve makes evidence of its own.
-  EXPECT_NEAR(followed.hypothesis.ln_evidence, followed.hypothesis.weighed.ln_evidence, 5);
+  const std::vector<FittedParameter> by_laplace = followed.parameters;
+  const double gain = find_strength_densities(subject.scene, found->candidates, followed);
+  EXPECT_NEAR(gain, 0, 5);
+  EXPECT_EQ(followed.hypothesis.ln_evidence, followed.hypothesis.weighed.ln_evidence + gain);
+  EXPECT_GT(followed.parameters.at(0).high, by_laplace.at(0).high) << "a ligament saturates: its upper end is long";
+  EXPECT_EQ(find_strength_densities(subject.scene, found->candidates, followed), 0) << "once is enough";
 }
 
 TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
