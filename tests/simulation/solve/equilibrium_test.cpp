@@ -193,6 +193,19 @@ TEST(Chain, GivesUpWhereItsWorkIsLimitedAndOnlyThere) {
   EXPECT_EQ(chain.solve(box.model).poses[0].x, free.poses[0].x);
 }
 
+TEST(Chain, WorkCountsTheCyclesOfMultigridBesideStepsAndFactors) {
+  const auto beside = [](int order) {
+    const testing::TestScene& scene = testing::dome_scene(order);
+    const ChainSolution solution = solve_chain(scene.mesh, scene.anatomy, testing::soft_model(), dome_poses);
+    int work = solution.work;
+    for (const SolveReport& report : {solution.inverse, solution.poses[0].report})
+      work -= report.newton_iterations + work_of_factor * report.factorisations;
+    return work;
+  };
+  EXPECT_EQ(beside(1), 0);
+  EXPECT_GT(beside(2), 0);
+}
+
 TEST(Chain, ProneGravityIntoTheMuscleIsRefused) {
   const BoxChain chain;
   EXPECT_THROW(chain.solve({{"prone", -Eigen::Vector3d::UnitZ()}, {"supine", Eigen::Vector3d::UnitZ()}}), InputError);
