@@ -2,6 +2,7 @@
 #include "diagnosis/evidence/joint_fit.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -156,6 +157,7 @@ bool JointFitter::improve() {
   const calibration::Fit kept = fit_.fit;
   if (fit_.dearest == 0) fit_.dearest = kept.prediction.solution.work;
   const simulation::Model kept_model = fit_.model;
+  step *= share_;
   for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
     fit_.fit.u = kept.u, fit_.nuisances = now.nuisances;
     const JointTrial trial = stepped(step);
@@ -166,6 +168,7 @@ bool JointFitter::improve() {
       if (objective() < before) {
         ++fit_.steps;
         fit_.dearest = std::max(fit_.dearest, fit_.fit.prediction.solution.work);
+        share_ = halving == 0 ? std::min(1.0, 2 * share_) : share_ * std::pow(0.5, halving);
         if (fit_.keeps_history) fit_.history.back().accepted = true;
         return true;
       }

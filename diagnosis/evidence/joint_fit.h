@@ -50,8 +50,8 @@ class JointFitter {
   void predict(const JointTrial& at, const simulation::ChainSolution* near);
   /// Slopes of parameters and nuisances at the prediction.
   std::unique_ptr<simulation::Sensitivities> linearise();
-  /// One step, shortened until F falls or a trial costs no more than it may (work_limit.h). @return  whether it did by
-  /// more than a little
+  /// One step, shortened until F falls or a trial costs no more than it may (work_limit.h); the next begins as short,
+  /// and is longer again once that did at once. @return  whether F fell by more than a little
   bool improve();
   /// Steps until none gains any more; slopes are those of the end.
   void descend(int most_steps, const std::function<void()>& before_step = {});
@@ -66,6 +66,7 @@ class JointFitter {
   JointFit& fit_;
   const BaseFit& ground_;
   std::vector<std::string> poses_;
+  double share_ = 1;  // of a step, that the next trial begins with
 };
 
 }  // namespace supine::diagnosis
