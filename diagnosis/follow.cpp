@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "common/error.h"
 #include "diagnosis/beside.h"
 #include "diagnosis/evidence/left_out.h"
+#include "diagnosis/evidence/strength_profile.h"
 #include "diagnosis/next_set.h"
 
 namespace supine::diagnosis {
@@ -101,15 +101,21 @@ class Follower {
     if (bent_) one_at_a_time();
   }
 
+  /// Whether a strength of it is far from linear and its density was not asked for.
+  bool is_unsettled(const Refit& refit) const {
+    const auto& effects = refit.hypothesis.effects;
+    return refit.solved && !refit.has_densities && std::any_of(effects.begin(), effects.end(), [this](int e) {
+             return is_far_from_linear(found_.candidates[static_cast<std::size_t>(e)]);
+           });
+  }
+
   /// The likeliest refit whose strengths are not settled yet, of those that are likely; the number of refits where
   /// there is none.
   std::size_t next_to_settle() const {
     for (const Hypothesis& h : found_.hypotheses) {
       if (h.probability < worth_refitting) break;
       for (std::size_t r = 0; r < found_.refits.size(); ++r)
-        if (const Refit& refit = found_.refits[r];
-            refit.solved && !refit.has_densities && refit.hypothesis.effects == h.effects)
-          return r;
+        if (is_unsettled(found_.refits[r]) && found_.refits[r].hypothesis.effects == h.effects) return r;
     }
     return found_.refits.size();
   }
@@ -122,7 +128,6 @@ class Follower {
       Refit& refit = found_.refits[at];
       tell("strengths of", refit.hypothesis.effects);
       const double gain = find_strength_densities(subject_.scene, found_.candidates, refit);
-      if (gain == 0) continue;
       hypothesis_of(found_, refit.hypothesis.effects).ln_evidence += gain;
       for (Hypothesis& h : found_.hypotheses)
         if (is_open(h) && h.drawn_at == static_cast<int>(at)) h.screened += gain, h.ln_evidence += gain;

@@ -22,8 +22,6 @@ using Eigen::VectorXd;
 constexpr double settled = 0.3;       // of F: a further step gains no more
 constexpr double longest_step = 1.0;  // of a coordinate of a parameter: e
 constexpr int most_halvings = 4;
-constexpr double lost_mm =
-    5;  // rms: further off, closest points may lie on the wrong side of a body as slender as a bar
 constexpr double other_moduli[] = {0.5, 2, 0.7, 1.4, 0.35, 2.8, 0.25, 4};
 
 void note(const VectorXd& u, bool failed, JointFit& fit) {

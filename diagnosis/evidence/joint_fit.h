@@ -14,6 +14,10 @@ namespace supine::diagnosis {
 
 struct BaseFit;
 
+/// RMS distance of the points of skin beyond which closest points are other ones: of a body as slender as a bar they
+/// may lie on its wrong side.
+inline constexpr double lost_mm = 5;
+
 /// A model and all that is never known, fitted together.
 struct JointFit {
   std::optional<calibration::FreeParameters> parameters;  ///< of the model without nuisances: where its priors stand
@@ -44,7 +48,7 @@ class JointFitter {
 
   const std::vector<std::string>& poses() const { return poses_; }
 
-  /// Takes the fit to a trial. The first of all, where it is more than 5 mm off, also tries other moduli, 0.25 to 4
+  /// Takes the fit to a trial. The first of all, where it is more than lost_mm off, also tries other moduli, 0.25 to 4
   /// times as stiff, and takes the nearest: closest points of a slender body may lie on its wrong side.
   /// @throws NumericalFailure  no equilibrium there; the fit is then at neither place
   void predict(const JointTrial& at, const simulation::ChainSolution* near);

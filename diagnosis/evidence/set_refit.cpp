@@ -22,9 +22,8 @@ using calibration::FreeParameters;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double far = 1;         // of a nuisance, in sigma: its shape holds no more
-constexpr double misplaced = 2;   // the same: a fit that has it there is no place to begin
-constexpr double far_off_mm = 5;  // with nothing moved: closest points are other ones there
+constexpr double far = 1;        // of a nuisance, in sigma: its shape holds no more
+constexpr double misplaced = 2;  // the same: a fit that has it there is no place to begin
 constexpr int most_joint_steps = 8;
 
 double offset_of(const Hypothesis& h, const std::string& name) {
@@ -186,13 +185,13 @@ bool is_misplaced(const JointFit& fit) {
 }
 
 /// Whether a fit may have moved what should stay, and begun with nothing moved may end elsewhere.
-bool may_be_misled(const JointFit& fit) { return is_misplaced(fit) && unmoved_rms_mm(fit) < far_off_mm; }
+bool may_be_misled(const JointFit& fit) { return is_misplaced(fit) && unmoved_rms_mm(fit) < lost_mm; }
 
 /// The same with effects at their usual size and nothing moved, but of a scan that lies far off. @return  whether that
 /// has an equilibrium
 bool fit_afresh(const calibration::MeasuredScene& scene, const BaseFit& base, const JointFit& from, Hypothesis& h,
                 JointFit& joint) {
-  if (unmoved_rms_mm(from) < far_off_mm)
+  if (unmoved_rms_mm(from) < lost_mm)
     for (Nuisance& nuisance : joint.nuisances) nuisance.value = 0;
   try {
     fit_jointly(scene, base, {joint.parameters->start(), joint.nuisances}, nullptr, 2 * most_joint_steps, joint, h);

@@ -9,6 +9,7 @@
 
 #include "common/error.h"
 #include "simulation/solve/newton_direction.h"
+#include "simulation/solve/termination_words.h"
 
 namespace supine::simulation {
 namespace {
@@ -47,30 +48,7 @@ double linear_tolerance(double residual_share, double share_before, double wante
   return std::max(quadratic, std::min(well_under * wanted_share / residual_share, loosest));
 }
 
-/// Why an attempt found no equilibrium, for the user.
-std::string reason(Termination end, int iterations, double residual_share) {
-  switch (end) {
-    case Termination::inverted:
-      return "an element is inverted";
-    case Termination::crushed:
-      return "an element is crushed";
-    case Termination::stalled:
-    case Termination::iteration_limit:
-      return fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iterations,
-                         residual_share);
-    case Termination::work_limit:
-      return fmt::format("given up: that costs too much; {:.1e} of the weight out of balance", residual_share);
-    case Termination::singular_tangent:
-      return "the tangent matrix is singular";
-    case Termination::line_search_failed:
-      return fmt::format("the line search stalled with {:.1e} of the weight out of balance", residual_share);
-    case Termination::residual_small:
-    case Termination::step_small:
-      break;
-  }
-  return "converged";
-}
-
+/// What SolveOptions::most_work bounds.
 int steps_and_factors(int steps, const NewtonDirection& direction) {
   return steps + work_of_factor * direction.factorisations();
 }
@@ -197,7 +175,7 @@ std::string EquilibriumSolver::failure(const Attempt& last, double load, const P
       "{}: no equilibrium found beyond {:.0f} % of gravity ({}{}). A softer tissue than this shape can carry, or a "
       "poor mesh there: raise breast.young_modulus_kpa or skin.young_modulus_kpa, use law = \"neo_hookean\", or "
       "look at the mesh with supine-tetrahedralise --check",
-      what_, 100 * load, reason(last.end, last.iterations, last.residual_share), place);
+      what_, 100 * load, termination_words(last.end, last.iterations, last.residual_share), place);
 }
 
 State EquilibriumSolver::state_of(const Problem& problem, const Points& sought) const {

@@ -16,7 +16,7 @@ class NewtonDirection;
 
 struct SolveOptions {
   int max_iterations = 50;                ///< Newton steps per load step, >= 0
-  int most_work = 500;                    ///< of one solve (EquilibriumSolver::work()), >= 0
+  int most_work = 500;                    ///< of one solve: steps and factorisations of EquilibriumSolver::work(), >= 0
   double step_tolerance_mm = 1e-8;        ///< of Termination::step_small, >= 0
   double residual_tolerance = 1e-11;      ///< of Termination::residual_small, share of the weight, >= 0
   double smallest_load_step = 1.0 / 128;  ///< share of the load, in (0, 1]
@@ -195,7 +195,7 @@ class EquilibriumSolver {
   static constexpr int unlimited = std::numeric_limits<int>::max();
   int steps_ = 0;              // Newton steps since the object was made
   int work_end_ = unlimited;   // of work(): bound of limit_work()
-  int solve_end_ = unlimited;  // of work(): bound of the solve under way
+  int solve_end_ = unlimited;  // of its steps and factorisations: bound of the solve under way
   std::string what_;           // the solve under way, for progress and messages
 };
 
