@@ -17,7 +17,7 @@ Eigen::VectorXd box_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& g, con
 /// One descent of the cost of fit_least_squares() with a fixed set of points: Gauss-Newton steps inside the ranges and
 /// a trust region (Nocedal and Wright, 4.1 and 10.3), a box in the coordinates of FreeParameters: a modulus goes by a
 /// factor of 4.5 at most, and by less after a step that brought less than it promised, or led where no equilibrium was
-/// found. Such a trial is given up once it has cost three times the dearest run that was of use.
+/// found. Such a trial is given up once a solve has cost three times the dearest of runs that were of use.
 ///
 /// Settled: the Gauss-Newton step within the ranges is less than a twentieth of a standard deviation (a tenth for
 /// @p rough descents), in the metric of JᵀJ for points that err by themselves with their noise, or with their rms where

@@ -47,8 +47,8 @@ void ChainCost::warm_start(const Eigen::VectorXd& u, const Prediction& predictio
   trial_.residuals = residuals_of(evaluator_.scene(), prediction, mask_, options_.noise_mm);
   trial_.own = own_rows(prediction);
   rows_ += trial_.own.size();
-  dearest_ = prediction.solution.work;
-  if (options_.near != nullptr) dearest_ = std::max(dearest_, options_.near->work);
+  dearest_ = prediction.solution.dearest_solve;
+  if (options_.near != nullptr) dearest_ = std::max(dearest_, options_.near->dearest_solve);
   linearise_trial();
   if (linearisation != nullptr) return;
   note(u, false);
@@ -164,7 +164,7 @@ void ChainCost::linearise_trial() {
   trial_.gradient = jacobian.transpose() * residuals;
   trial_.information = jacobian.transpose() * jacobian;
   trial_.rows = rows_;
-  dearest_ = std::max(dearest_, trial_.prediction.solution.work);
+  dearest_ = std::max(dearest_, trial_.prediction.solution.dearest_solve);
   accepted_ = trial_;
 }
 

@@ -19,7 +19,7 @@ class ChainCost {
   void warm_start(const Eigen::VectorXd& u, const Prediction& prediction, const Linearisation* linearisation);
 
   /// Runs the chain at @p u. @return its cost; none where no equilibrium is found, or not for three times what the
-  /// dearest accepted run has cost
+  /// dearest solve of accepted runs has cost
   std::optional<double> attempt(const Eigen::VectorXd& u);
   /// Makes the last attempt the accepted point, with its slopes.
   void accept();
@@ -55,7 +55,7 @@ class ChainCost {
   Eigen::Index rows_;
   State accepted_, trial_;
   double best_rms_mm_;
-  int dearest_ = 0;  // ChainSolution::work of an accepted run
+  int dearest_ = 0;  // ChainSolution::dearest_solve of an accepted run
 };
 
 }  // namespace supine::calibration

@@ -7,16 +7,16 @@
 
 namespace supine::calibration {
 
-/// Bounds what a trial of a fit may cost, for as long as it lives: one that costs more than three times the dearest
-/// that was of use is given up, because mostly no equilibrium is near (NoEquilibrium).
+/// Bounds what a trial of a fit may cost, for as long as it lives: one of which a solve costs more than three times the
+/// dearest that was of use is given up, because mostly no equilibrium is near (NoEquilibrium).
 class TrialLimit {
  public:
-  /// @param dearest  work of the dearest solution that was of use (ChainSolution::work)
+  /// @param dearest  work of the dearest solve of those that were of use (ChainSolution::dearest_solve)
   TrialLimit(simulation::Chain& chain, int dearest) : chain_(chain) {
-    constexpr int cost_share = 3, least_allowed = 100;  // the second: EquilibriumSolver::work() that any may take
-    chain.limit_work(std::max(least_allowed, cost_share * dearest));
+    constexpr int cost_share = 3, least_allowed = 50;  // the second: EquilibriumSolver::work() that any solve may take
+    chain.limit_each_solve(std::max(least_allowed, cost_share * dearest));
   }
-  ~TrialLimit() { chain_.limit_work({}); }
+  ~TrialLimit() { chain_.limit_each_solve({}); }
   TrialLimit(const TrialLimit&) = delete;
   TrialLimit& operator=(const TrialLimit&) = delete;
 

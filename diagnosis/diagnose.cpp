@@ -24,6 +24,13 @@ double probability_of_nothing(const std::vector<Hypothesis>& hypotheses) {
   return sum;
 }
 
+double probability_of_unlisted(const std::vector<Hypothesis>& hypotheses) {
+  double sum = 0;
+  for (const Hypothesis& h : hypotheses)
+    for (const double share : h.with_unlisted) sum += h.probability * share;
+  return sum;
+}
+
 bool is_measurement(const std::string& effect) {
   const auto kind = simulation::traits_of(effect).kind;
   return kind == simulation::EffectKind::measurement || kind == simulation::EffectKind::numerical;
@@ -90,16 +97,37 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
   Diagnosis result;
   const double nothing = probability_of_nothing(hypotheses);
   std::vector<std::string> denied;
+  std::vector<Inclusion> at_end;
   for (const Inclusion& one : included) {
     if (one.probability < priors.named_at) continue;
-    (one.left_out_gain > speaks_against ? result.missing : denied).push_back(one.effect);
+    if (!one.ends_at.empty())
+      at_end.push_back(one);
+    else
+      (one.left_out_gain > speaks_against ? result.missing : denied).push_back(one.effect);
   }
   if (!result.missing.empty()) {
     result.verdict = Verdict::missing;
     result.ambiguous_rest = likely_effects(hypotheses, effects, included, [&](const Inclusion& one) {
-      return one.probability < priors.named_at && (one.bayes_factor >= settling_factor || is_left_open(priors, one));
+      return (one.probability < priors.named_at || !one.ends_at.empty()) &&
+             (one.bayes_factor >= settling_factor || is_left_open(priors, one));
     });
     result.why = fmt::format("probability {:.2f} or more", priors.named_at);
+    return result;
+  }
+  if (!at_end.empty()) {
+    result.verdict = Verdict::unexplained;
+    result.missing = {at_end.front().effect};
+    result.why = fmt::format("{} would have to be at the end of its range: something else, that looks like it",
+                             at_end.front().ends_at);
+    return result;
+  }
+  if (probability_of_unlisted(hypotheses) >= priors.named_at) {
+    result.verdict = Verdict::unexplained;
+    if (!included.empty()) result.missing = {included.front().effect};
+    result.ambiguous_rest = likely_effects(hypotheses, effects, included,
+                                           [](const Inclusion& one) { return one.bayes_factor >= settling_factor; });
+    result.why = fmt::format("a local cause that the catalogue does not list has probability {:.2f}",
+                             probability_of_unlisted(hypotheses));
     return result;
   }
   const bool some = !included.empty() && included.front().probability > 0 &&

@@ -23,13 +23,15 @@ struct Inclusion {
   double probability = 0;
   double bayes_factor = 1;   ///< odds of the probability over those of the prior
   double left_out_gain = 0;  ///< ln density of what was left out, with it less without; 0 where it was not asked for
+  std::string ends_at = {};  ///< a number of it that ended at an end of its range, in the likeliest set that holds it
 };
 
 struct Diagnosis {
   Verdict verdict = Verdict::nothing_missing;
-  std::vector<std::string> missing;         ///< all that is; the whole set when ambiguous; the best when unexplained
-  std::vector<std::string> ambiguous_rest;  ///< under missing: rivals for one more
-  std::string why;                          ///< one sentence
+  std::vector<std::string> missing;  ///< all that is; the whole set when ambiguous; the best when unexplained
+  std::vector<std::string>
+      ambiguous_rest;  ///< under missing: rivals for one more; of a local cause: what may be beside
+  std::string why;     ///< one sentence
 };
 
 /// The most probable first.
@@ -38,7 +40,9 @@ std::vector<Inclusion> inclusions(const std::vector<Hypothesis>& hypotheses, con
 
 /// The first line that holds:
 ///   missing          some effect has a probability of priors.named_at or more, and what was left out does not speak
-///                    against it by 3 or more
+///                    against it by 3 or more, and none of its numbers ended at an end of its range
+///   unexplained      an effect would be missing but for such a number: so large, steep or narrow it is something else
+///   unexplained      a local cause that no effect lists has priors.named_at or more (unlisted.h)
 ///   ambiguous        "nothing" has less than 0.5 and some Bayes factor is 3 or more or an expected effect is likelier
 ///                    than nothing, or "nothing" has less than 0.25, or an expected effect is neither found nor
 ///                    excluded and cannot be seen; expected effects that are neither are named with the others

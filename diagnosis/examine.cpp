@@ -44,6 +44,23 @@ void ask_what_was_left_out(const Subject& subject, Findings& found) {
   }
 }
 
+/// Of what would be named: whether a number of it ended at an end of its range, in the likeliest set that holds it.
+void note_range_ends(Findings& found) {
+  const auto names = found.effects();
+  for (Inclusion& one : found.included) {
+    if (one.probability < found.priors.named_at) break;
+    const Refit* refit = nullptr;
+    for (const Hypothesis& h : found.hypotheses) {
+      std::vector<std::string> set;
+      for (const int effect : h.effects) set.push_back(names[static_cast<std::size_t>(effect)]);
+      if (std::find(set.begin(), set.end(), one.effect) != set.end() && (refit = found.refit_of(set)) != nullptr) break;
+    }
+    if (refit == nullptr) continue;
+    for (const FittedParameter& number : refit->parameters)
+      if (number.name.starts_with(one.effect + ".") && number.end != RangeEnd::none) one.ends_at = number.name;
+  }
+}
+
 Unexplained summary(std::vector<double> draws) {
   double sum = 0;
   for (const double draw : draws) sum += draw;
@@ -164,8 +181,10 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   found->hypotheses = Screening(found->base, found->candidates, options.priors).hypotheses();
   found->held_out_rms_mm = held_out_rms(found->base, nothing_of(*found), fit.residuals);
   follow(subject, options, *found);
+  found->unlisted = weigh_unlisted(found->base, options.priors, found->hypotheses);
   found->included = inclusions(found->hypotheses, found->effects(), options.priors);
   ask_what_was_left_out(subject, *found);
+  note_range_ends(*found);
   find_unexplained(options.seed, *found);
   found->places = find_places(subject, *found);
   found->budget = error_budget(*found);

@@ -64,6 +64,7 @@ struct Findings {
   std::vector<Beside> beside;               ///< each holds those before it
   std::vector<Refit> refits;                ///< of some of them, the likelier first
   std::vector<Inclusion> included;          ///< most probable first
+  Unlisted unlisted;                        ///< causes that no effect lists, as rivals
   Unexplained unexplained;                  ///< over all hypotheses
   std::vector<Unexplained> unexplained_by;  ///< of the first hypotheses_told
   Unexplained left_by_base;                 ///< where nothing is added

@@ -142,7 +142,7 @@ void descend(Evaluator& evaluator, const FreeParameters& parameters, const Metri
     const simulation::ChainSolution near =
         calibration::extrapolated(fit.solution.prediction.solution, fit.solution.linearisation.by_coordinate, step);
     ++fit.evaluations;
-    dearest = std::max(dearest, fit.solution.prediction.solution.work);
+    dearest = std::max(dearest, fit.solution.prediction.solution.dearest_solve);
     try {
       const calibration::TrialLimit limit(evaluator.chain(), dearest);
       WeightedFit trial = predicted(evaluator, parameters, metric, fit.solution.u + step, &near);

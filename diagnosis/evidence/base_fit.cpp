@@ -110,6 +110,7 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
   add_creases(crease_error(evaluator.scene(), base.fit.prediction, residuals), base);
   base.patches = base.clusters.means(
       patchiness_shapes(evaluator.chain(), sensitivities, base.fit.prediction, residuals, priors.patchiness));
+  base.local = local_causes(evaluator.chain().mechanics(), priors.patchiness, base.patches);
   base.errors += base.patches * base.patches.transpose();
   base.patchiness_mm = std::sqrt(base.patches.squaredNorm() / static_cast<double>(base.patches.rows()));
   base.mean_mm = VectorXd::Zero(residuals.size());

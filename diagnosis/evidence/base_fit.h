@@ -13,6 +13,7 @@
 #include "diagnosis/evidence/linear_evidence.h"
 #include "diagnosis/evidence/nuisances.h"
 #include "diagnosis/evidence/priors.h"
+#include "diagnosis/evidence/unlisted.h"
 #include "diagnosis/numerical_error.h"
 
 namespace supine::diagnosis {
@@ -28,6 +29,7 @@ struct BaseFit : JointFit {
   Eigen::VectorXd mean_mm;            ///< #R, added to the distances: what the mesh takes away
   Eigen::MatrixXd errors;             ///< R over the clusters, without nuisances
   Eigen::MatrixXd patches;            ///< what of them uneven tissue, skin and muscle make: P with P Pᵀ in R
+  LocalCauses local;                  ///< that no effect lists
   Eigen::MatrixXd kernel;             ///< K over the clusters
   std::unique_ptr<ErrorCovariance> covariance;  ///< of both
   double scale_mm = 0, most_mm = 0;             ///< of the prior of the discrepancy's size

@@ -108,7 +108,7 @@ void lower_unfollowed(std::vector<Hypothesis>& hypotheses) {
 }
 
 double ln_weight(const Hypothesis& h) {
-  return h.ln_prior + h.ln_evidence + (h.ground != nullptr ? h.ground->ln_weight : 0);
+  return h.ln_prior + h.ln_evidence + h.ln_unlisted + (h.ground != nullptr ? h.ground->ln_weight : 0);
 }
 
 void normalise(std::vector<Hypothesis>& hypotheses) {

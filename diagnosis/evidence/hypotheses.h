@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,20 +16,22 @@ inline constexpr double lines_bend_at = 20;
 
 /// A set of effects that may be missing, and how likely it is.
 struct Hypothesis {
-  std::vector<int> effects;                        ///< rows of the candidates, ascending; none: nothing is missing
-  double ln_prior = 0;                             ///< of the set
-  double ln_evidence = 0;                          ///< up to what is the same for all
-  double screened = 0;                             ///< the same along straight lines
-  double probability = 0;                          ///< posterior, over all that were weighed
-  bool refitted = false;                           ///< through the whole chain, else along straight lines
-  int drawn_at = -1;                               ///< refit from which the lines were drawn; -1: the base fit
-  bool from_usual = false;                         ///< lines are those of its effect at its usual size
-  bool again = false;                              ///< refitted where it had been: says nothing of lines
-  const BaseFit* ground = nullptr;                 ///< whose errors it was weighed under
-  bool unsolved = false;                           ///< the chain found no equilibrium: stays as screened
-  Weighed weighed;                                 ///< by rows
-  std::vector<int> rows;                           ///< of the evidence's directions
-  std::shared_ptr<const LinearEvidence> evidence;  ///< it was weighed by
+  std::vector<int> effects;                         ///< rows of the candidates, ascending; none: nothing is missing
+  double ln_prior = 0;                              ///< of the set
+  double ln_evidence = 0;                           ///< up to what is the same for all
+  double screened = 0;                              ///< the same along straight lines
+  double probability = 0;                           ///< posterior, over all that were weighed
+  bool refitted = false;                            ///< through the whole chain, else along straight lines
+  int drawn_at = -1;                                ///< refit from which the lines were drawn; -1: the base fit
+  bool from_usual = false;                          ///< lines are those of its effect at its usual size
+  bool again = false;                               ///< refitted where it had been: says nothing of lines
+  const BaseFit* ground = nullptr;                  ///< whose errors it was weighed under
+  double ln_unlisted = 0;                           ///< of what a cause that no effect lists may add (unlisted.h)
+  std::array<double, local_kinds> with_unlisted{};  ///< share of its probability with one, by kind
+  bool unsolved = false;                            ///< the chain found no equilibrium: stays as screened
+  Weighed weighed;                                  ///< by rows
+  std::vector<int> rows;                            ///< of the evidence's directions
+  std::shared_ptr<const LinearEvidence> evidence;   ///< it was weighed by
 
   /// Place of a direction in `weighed`, or -1.
   int place_of(const std::string& name) const;
@@ -73,7 +76,7 @@ std::vector<Hypothesis> screen_beside(const BaseFit& ground, const JointFit& at,
 /// holds it. It is a gain over nothing that they promise, so not below nothing's.
 void lower_unfollowed(std::vector<Hypothesis>& hypotheses);
 
-/// ln of prior, evidence and the weight of the errors it is under.
+/// ln of prior, evidence, what an unlisted cause adds, and the weight of the errors it is under.
 double ln_weight(const Hypothesis& h);
 
 /// Fills the probabilities and puts the most probable first.

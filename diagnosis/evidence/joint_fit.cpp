@@ -121,8 +121,8 @@ void JointFitter::predict(const JointTrial& at, const simulation::ChainSolution*
   if (!first) return;
   for (calibration::FitEvaluation& row : fit_.history) row.accepted = row.values == fit_.parameters->values(fit_.fit.u);
   // A trial goes on from shapes: worth half as much again as one from nothing (TrialLimit gives it three times this).
-  const int work = fit_.fit.prediction.solution.work;
-  fit_.dearest = std::max(fit_.dearest, near != nullptr ? std::max(work, near->work) : work / 2);
+  const int work = fit_.fit.prediction.solution.dearest_solve;
+  fit_.dearest = std::max(fit_.dearest, near != nullptr ? std::max(work, near->dearest_solve) : work / 2);
 }
 
 std::unique_ptr<simulation::Sensitivities> JointFitter::linearise() {
@@ -153,7 +153,7 @@ bool JointFitter::improve() {
   const double promised = before - objective_of(y + evidence.directions().columns * step, stepped(step));
   if (promised < settled) return false;
   const calibration::Fit kept = fit_.fit;
-  if (fit_.dearest == 0) fit_.dearest = kept.prediction.solution.work;
+  if (fit_.dearest == 0) fit_.dearest = kept.prediction.solution.dearest_solve;
   const simulation::Model kept_model = fit_.model;
   step *= share_;
   for (int halving = 0; halving < most_halvings; ++halving, step *= 0.5) {
@@ -163,12 +163,13 @@ bool JointFitter::improve() {
     try {
       const calibration::TrialLimit limit(evaluator_.chain(), fit_.dearest);
       predict(trial, &near);
-      if (objective() < before) {
+      const double gain = before - objective();
+      if (gain > 0) {
         ++fit_.steps;
-        fit_.dearest = std::max(fit_.dearest, fit_.fit.prediction.solution.work);
+        fit_.dearest = std::max(fit_.dearest, fit_.fit.prediction.solution.dearest_solve);
         share_ = halving == 0 ? std::min(1.0, 2 * share_) : share_ * std::pow(0.5, halving);
         if (fit_.keeps_history) fit_.history.back().accepted = true;
-        return true;
+        return gain > settled;
       }
     } catch (const NumericalFailure&) {
       note(trial.u, true, fit_);  // no equilibrium there: a shorter step
@@ -182,8 +183,10 @@ bool JointFitter::improve() {
 void JointFitter::descend(int most_steps, const std::function<void()>& before_step) {
   for (int step = 0; step < most_steps; ++step) {
     if (before_step) before_step();
-    if (!improve()) break;
-    linearise();
+    const int before = fit_.steps;
+    const bool gained = improve();
+    if (fit_.steps > before) linearise();
+    if (!gained) break;
   }
 }
 

@@ -27,7 +27,7 @@ struct JointFit {
   double size_mm = 0;                                     ///< s of the discrepancy that is likeliest
   int evaluations = 0;
   int steps = 0;    ///< that lowered F
-  int dearest = 0;  ///< work of the dearest solution that was of use (ChainSolution::work)
+  int dearest = 0;  ///< work of the dearest solve of those that were of use (ChainSolution::dearest_solve)
   bool keeps_history = false;
   std::vector<calibration::FitEvaluation> history;  ///< every trial, where it is kept
 };

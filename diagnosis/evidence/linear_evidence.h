@@ -86,6 +86,7 @@ class LinearEvidence {
   /// A draw from the posterior of what neither the numbers nor the errors explain, mm, #n.
   Eigen::VectorXd draw_discrepancy(const std::vector<int>& which, const Weighed& weighed,
                                    std::mt19937_64& generator) const;
+  const ErrorCovariance& errors() const { return errors_; }
   const Directions& directions() const { return all_; }
   const Eigen::VectorXd& distances() const { return distances_; }
 

@@ -46,14 +46,15 @@ std::vector<Hypothesis> weighed_again(std::vector<Hypothesis> hypotheses, double
   return hypotheses;
 }
 
-/// With what was left out as it was asked before.
+/// With what was left out, and ends of ranges, as they were asked for before.
 std::vector<Inclusion> included_in(const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& effects,
                                    const std::vector<Inclusion>& before, const Priors& priors) {
   std::vector<Inclusion> list = inclusions(hypotheses, effects, priors);
-  for (Inclusion& one : list)
-    one.left_out_gain = std::find_if(before.begin(), before.end(), [&one](const Inclusion& other) {
-                          return other.effect == one.effect;
-                        })->left_out_gain;
+  for (Inclusion& one : list) {
+    const auto& as_before = *std::find_if(before.begin(), before.end(),
+                                          [&one](const Inclusion& other) { return other.effect == one.effect; });
+    one.left_out_gain = as_before.left_out_gain, one.ends_at = as_before.ends_at;
+  }
   return list;
 }
 

@@ -25,6 +25,7 @@ struct Priors {
   std::array<double, 4> of_sets = {0.5, 0.3, 0.15, 0.05};
   /// Effects that are as likely there as not, each by itself; `of_sets` is of the others.
   std::vector<std::string> expected = {};
+  double unlisted = 0.1;  ///< that a local cause is there that no effect lists (unlisted.h); 0 = none is weighed
   simulation::MeasurementTolerances known = {};  ///< nuisances, 1 sigma
   std::map<std::string, KnownOfPose> of_pose;    ///< by name, in place of `known` and `scan_shared_mm`
   Patchiness patchiness = {};

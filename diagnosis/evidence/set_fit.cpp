@@ -84,7 +84,7 @@ void fit_jointly(const calibration::MeasuredScene& scene, const BaseFit& base, c
   calibration::Evaluator evaluator(scene, joint.parameters->base(), accurate_enough());
   JointFitter fitter(evaluator, joint, base);
   if (near != nullptr) {
-    const calibration::TrialLimit limit(evaluator.chain(), std::max(base.dearest, near->work));
+    const calibration::TrialLimit limit(evaluator.chain(), std::max(base.dearest, near->dearest_solve));
     fitter.predict(start, near);
   } else {
     fitter.predict(start, nullptr);

@@ -90,7 +90,10 @@ std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParamet
     const auto value = [&](double at) {
       return parameters.value(i, std::clamp(at, parameters.lower()[i], parameters.upper()[i]));
     };
-    const RangeEnd end = range_end(parameters, refit.joint.fit.u, i);
+    VectorXd middle = refit.joint.fit.u;
+    middle[i] = std::clamp(u, parameters.lower()[i], parameters.upper()[i]);
+    RangeEnd end = range_end(parameters, refit.joint.fit.u, i);
+    if (end == RangeEnd::none) end = range_end(parameters, middle, i);
     const auto at = curved.find(i);
     if (at == curved.end())
       list.push_back({name, parameters.unit(i), value(u), value(u - reach), value(u + reach), end});

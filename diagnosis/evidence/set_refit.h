@@ -19,7 +19,7 @@ RangeEnd range_end(const calibration::FreeParameters& parameters, const Eigen::V
 struct FittedParameter {
   std::string name, unit;
   double value, low, high;
-  RangeEnd end = RangeEnd::none;  ///< where the fit ended
+  RangeEnd end = RangeEnd::none;  ///< where the fit ended, or the middle of what is likely lies
 };
 
 /// A set of effects added to the model, and everything free fitted again through the whole chain.

@@ -58,6 +58,12 @@ class DiagnoseTool : public Tool {
                    "four numbers > 0 that add up to 1 (default: 0.5,0.3,0.15,0.05)")
         ->delimiter(',')
         ->expected(4);
+    app.add_option(
+           "--unlisted", options_.unlisted,
+           "probability, before anything is measured, that tissue, skin or muscle is otherwise at some place in "
+           "a way that no effect lists; 0 = that is not weighed")
+        ->check(within(0, 0.9))
+        ->capture_default_str();
     app.add_flag("--ladder", ladder_,
                  "add what is missing, fit and examine again, until nothing is missing or three effects were added; "
                  "writes ladder.json and model.toml, the model as given with what was added and the fitted numbers");

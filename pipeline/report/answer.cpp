@@ -145,6 +145,21 @@ std::string place_of_scan(const Json& place) {
                      length("shift_mm"), length("turn_deg"));
 }
 
+/// "Something local that is not listed has probability 0.98: the muscle about (12, -40, 33) mm …"; empty where it is
+/// hardly likelier than it was before.
+std::string unlisted_cause(const Json& unlisted) {
+  constexpr double worth_telling = 0.2;
+  if (!(number(unlisted, "probability") >= worth_telling)) return "";
+  const Json &place = unlisted.at("place_mm"), &reach = unlisted.at("interval95");
+  const bool moved = unlisted.contains("moved_mm");
+  return fmt::format(
+      "Something local that no effect lists has probability {:.2f}: the {} about ({:.0f}, {:.0f}, {:.0f}) mm {} {:.2g} "
+      "{} (95 %: {:.2g} to {:.2g}).",
+      number(unlisted, "probability"), unlisted.value("likeliest", "?"), place[0].get<double>(), place[1].get<double>(),
+      place[2].get<double>(), moved ? "lies" : "is", number(unlisted, moved ? "moved_mm" : "times_as_stiff"),
+      moved ? "mm further outward" : "times as stiff", reach[0].get<double>(), reach[1].get<double>());
+}
+
 void add_facts(const Json& diagnosis, const Collected& collected, const char* body, Answer& answer) {
   if (const std::string spots = where(diagnosis); !spots.empty())
     answer.facts.push_back(
@@ -153,6 +168,8 @@ void add_facts(const Json& diagnosis, const Collected& collected, const char* bo
     answer.facts.push_back(fmt::format("No effect explains {:.1f} mm of it (95 %: {:.1f} to {:.1f}).", left,
                                        diagnosis["unexplained95"][0].get<double>(),
                                        diagnosis["unexplained95"][1].get<double>()));
+  if (const std::string local = unlisted_cause(diagnosis.value("unlisted", Json::object())); !local.empty())
+    answer.facts.push_back(local);
   for (const Json& place : diagnosis.value("registration", Json::array())) answer.facts.push_back(place_of_scan(place));
   if (const Json& fit = collected.find("calibration.json"); fit.is_object() && fit.contains("as_given"))
     answer.facts.push_back(fmt::format(

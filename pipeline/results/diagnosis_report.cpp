@@ -113,6 +113,22 @@ Json hypotheses_json(const Findings& found) {
   return list;
 }
 
+/// A local cause that no effect lists: how likely, of which kind, and where.
+Json unlisted_json(const diagnosis::Unlisted& found) {
+  Json kinds = Json::object();
+  for (std::size_t kind = 0; kind < diagnosis::local_kinds; ++kind)
+    kinds[diagnosis::local_kind_name(static_cast<diagnosis::LocalKind>(kind))] = found.by_kind[kind];
+  const bool moved = found.kind == diagnosis::LocalKind::muscle;
+  const auto value = [moved](double size) { return moved ? size : std::exp(size); };
+  return {{"probability", found.probability},
+          {"by_kind", kinds},
+          {"likeliest", diagnosis::local_kind_name(found.kind)},
+          {"place_mm", {found.place_mm.x(), found.place_mm.y(), found.place_mm.z()}},
+          {"within_mm", found.within_mm},
+          {moved ? "moved_mm" : "times_as_stiff", value(found.size)},
+          {"interval95", {value(found.low), value(found.high)}}};
+}
+
 /// 1 sigma of a number where the effect is not missing: that of the nuisance which the effect replaces, else 0.
 double null_sd(const Findings& found, const std::string& number) {
   for (const diagnosis::Nuisance& nuisance : found.base.nuisances)
@@ -177,6 +193,7 @@ Json included_json(const Findings& found) {
                     {"probability", one.probability},
                     {"bayes_factor", one.bayes_factor},
                     {"left_out_gain", one.left_out_gain},
+                    {"ends_at", one.ends_at},
                     {"numbers", numbers}});
   }
   return list;
@@ -296,6 +313,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["singles"] = singles_json(found);
   f["unexplained_mm"] = found.unexplained.mean_mm;
   f["unexplained95"] = {found.unexplained.low_mm, found.unexplained.high_mm};
+  f["unlisted"] = unlisted_json(found.unlisted);
   f["unexplained_bound_mm"] = found.priors.unexplained_bound_mm;
   f["registration"] = registration_json(found);
   f["candidates"] = Json::array();

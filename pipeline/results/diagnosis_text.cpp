@@ -70,6 +70,8 @@ void say_unexpected(const Run& run, const Findings& found) {
   if (!words.empty()) run.say("  otherwise than expected, " + joined(words, "; "));
 }
 
+constexpr double worth_telling = 0.2;  // of a local cause: twice what it was before
+
 void say_hypotheses(const Run& run, const Findings& found) {
   constexpr double worth_a_line = 0.01;
   for (const auto& [one, left] : found.told()) {
@@ -81,6 +83,20 @@ void say_hypotheses(const Run& run, const Findings& found) {
                         names.empty() ? "nothing missing" : joined(names, " + "), one->probability, left.mean_mm,
                         left.low_mm, left.high_mm, refit ? values_of(refit->parameters) : ""));
   }
+}
+
+/// Whether a local cause that no effect lists is likelier than it was before, and where.
+void say_unlisted(const Run& run, const Findings& found) {
+  const diagnosis::Unlisted& u = found.unlisted;
+  if (u.probability < worth_telling) return;
+  const std::string place = fmt::format("about ({:.0f}, {:.0f}, {:.0f}) mm (to {:.0f} mm)", u.place_mm.x(),
+                                        u.place_mm.y(), u.place_mm.z(), std::max(1.0, u.within_mm));
+  const std::string size = u.kind == diagnosis::LocalKind::muscle
+                               ? fmt::format("lies {:+.1f} mm [{:+.1f}, {:+.1f}] outward", u.size, u.low, u.high)
+                               : fmt::format("is {:.2g} times [{:.2g}, {:.2g}] as stiff", std::exp(u.size),
+                                             std::exp(u.low), std::exp(u.high));
+  run.say(fmt::format("  {:<34}{:>6.2f}      the {} {} {}", "something local that is not listed", u.probability,
+                      diagnosis::local_kind_name(u.kind), place, size));
 }
 
 std::string where(const std::vector<diagnosis::HotSpot>& spots) {
@@ -213,6 +229,7 @@ void say_diagnosis(const Run& run, const DiagnosisResult& result) {
   say_beside(run, found);
   say_unexpected(run, found);
   say_hypotheses(run, found);
+  say_unlisted(run, found);
   run.say(
       fmt::format("  residual: MAE {:.2f} mm, RMS {:.2f}, held-out {:.2f}; scan noise {:.2f}, registration {:.2f}, "
                   "numerical {:.2f}, parameters {:.2f}, patchiness {:.2f}, unexplained {:.2f}",

@@ -103,6 +103,8 @@ void DiagnoseOptions::check() const {
         std::pair("chest_wall_mm", known.chest_wall_mm)})
     if (value && !(*value >= 0 && std::isfinite(*value)))
       throw InputError(fmt::format("{} = {}: must be 0 or more, mm", name, *value));
+  if (!(unlisted >= 0 && unlisted <= 0.9))
+    throw InputError(fmt::format("unlisted = {}: must be a probability from 0 to 0.9", unlisted));
   if (prior_of_sets.size() != 0 && prior_of_sets.size() != 4)
     throw InputError(fmt::format("--prior {}: must be four numbers, of nothing, one, two and three effects",
                                  fmt::join(prior_of_sets, ",")));
@@ -134,6 +136,7 @@ diagnosis::ExamineOptions examine_options(const CaseToDiagnose& subject, const D
   options.seed = asked.seed;
   options.priors = case_priors(subject.measured->description, asked.known);
   options.priors.patchiness = subject.patchiness;
+  options.priors.unlisted = asked.unlisted;
   if (!asked.prior_of_sets.empty())
     std::copy(asked.prior_of_sets.begin(), asked.prior_of_sets.end(), options.priors.of_sets.begin());
   options.progress = [&live](const std::string& what) { live.show(what); };

@@ -17,6 +17,7 @@ struct DiagnoseOptions {
   bool other_meshes = true;  ///< measure the error of the mesh; false: it is taken to be exact
   unsigned seed = 1;
   KnownOptions known = {};
+  double unlisted = 0.1;                   ///< Priors::unlisted
   std::vector<double> prior_of_sets = {};  ///< of nothing, one, two and three effects; empty = the defaults
 
   /// @throws InputError  naming the option, its value and the bound

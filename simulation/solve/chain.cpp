@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -153,11 +154,10 @@ ChainSolution Chain::solve(const Model& model, const ChainSolution* near, Invers
 ChainSolution Chain::solve_all(const Model& model, const ChainSolution* near, InverseMethod method) {
   const meshing::TetMesh& mesh = mechanics_.mesh();
   solver_.forget();
-  const int work_before = solver_.work();
   ChainSolution solution;
   const Eigen::VectorXd offset = values_of(fields(model, poses_[0])).imaged_offset;
   solution.prone = mesh.points + Eigen::Map<const Points>(offset.data(), mesh.points.rows(), 3);
-  solve_undeformed(model, method, near, solution);
+  within_limit(solution, [&] { solve_undeformed(model, method, near, solution); });
   check_cells(mesh, solution.prone, solution.X, "undeformed", solution.inverse);
   note_folds(mesh, solution.X, "undeformed", solution.inverse, solution.warnings);
   for (std::size_t p = 1; p < poses_.size(); ++p) {
@@ -165,13 +165,22 @@ ChainSolution Chain::solve_all(const Model& model, const ChainSolution* near, In
     Points start;
     if (near != nullptr) start = pushed_forward(mesh.cells, near->poses[p - 1].x, near->X, solution.X);
     PoseSolution pose{.name = poses_[p].name, .x = {}, .report = {}};
-    pose.report = solve_pose(model, poses_[p], near != nullptr ? &start : nullptr, solution, pose.x);
+    within_limit(solution, [&] {
+      pose.report = solve_pose(model, poses_[p], near != nullptr ? &start : nullptr, solution, pose.x);
+    });
     check_cells(mesh, pose.x, solution.X, pose.name, pose.report);
     note_folds(mesh, pose.x, pose.name, pose.report, solution.warnings);
     solution.poses.push_back(std::move(pose));
   }
-  solution.work = solver_.work() - work_before;
   return solution;
+}
+
+/// One solve of a chain, no dearer than each may be.
+void Chain::within_limit(ChainSolution& solution, const std::function<void()>& solve) {
+  const int before = solver_.work();
+  solver_.limit_work(most_of_each_);
+  solve();
+  solution.dearest_solve = std::max(solution.dearest_solve, solver_.work() - before);
 }
 
 /// By growing load; where that leads nowhere, as the patient turns.
@@ -180,7 +189,7 @@ SolveReport Chain::solve_pose(const Model& model, const PoseLoad& pose, const Po
   try {
     return solver_.forward(solution.X, x, "undeformed → " + pose.name, start);
   } catch (const NoEquilibrium&) {
-    if (imaged_free_of_load() || !(poses_[0].gravity.norm() > 0) || !(pose.gravity.norm() > 0)) throw;
+    if (most_of_each_ || imaged_free_of_load() || !(poses_[0].gravity.norm() > 0) || !(pose.gravity.norm() > 0)) throw;
     const auto turned_load = [&](const Eigen::Vector3d& gravity) { load(model, {pose.name, gravity}); };
     x = solution.prone;
     const Turn turn = turn_of(mechanics_.anatomy(), poses_[0].gravity, pose.gravity);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,7 +44,7 @@ struct ChainSolution {
   PoseSolution round_trip;          ///< the imaged pose again, from X and no load; filled by Chain::certify()
   double round_trip_max_mm = 0;     ///< its largest distance to the known shape
   double round_trip_rms_mm = 0;
-  int work = 0;                       ///< what Chain::solve() cost: EquilibriumSolver::work()
+  int dearest_solve = 0;              ///< EquilibriumSolver::work() of the dearest solve of Chain::solve()
   std::vector<std::string> warnings;  ///< what a user must know of the answer
 };
 
@@ -78,9 +79,12 @@ class Chain {
   ChainSolution solve(const Model& model, const ChainSolution* near = nullptr,
                       InverseMethod method = InverseMethod::newton);
 
-  /// EquilibriumSolver::limit_work() of all solves of a chain together: a trial that costs much more than others is not
-  /// worth waiting for.
-  void limit_work(std::optional<int> most) { solver_.limit_work(most); }
+  /// EquilibriumSolver::limit_work() of each solve of a chain: a trial of which one costs much more than any of others
+  /// is not worth waiting for, nor for the body to be turned where growing load led nowhere. nullopt = no bound.
+  void limit_each_solve(std::optional<int> most) {
+    most_of_each_ = most;
+    solver_.limit_work(most);
+  }
 
   /// Makes the round trip: loads solution.X with the imaged pose's gravity, from no load. Where forces have no energy
   /// it also looks for a second balanced shape of every pose. Notes what touches, and warns of skin that passes through
@@ -96,6 +100,7 @@ class Chain {
   friend class Sensitivities;
   ChainSolution solve_all(const Model& model, const ChainSolution* near, InverseMethod method);
   void load(const Model& model, const PoseLoad& pose);
+  void within_limit(ChainSolution& solution, const std::function<void()>& solve);
   SolveReport solve_pose(const Model& model, const PoseLoad& pose, const Points* start, const ChainSolution& solution,
                          Points& x);
   void solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
@@ -107,6 +112,7 @@ class Chain {
   std::vector<PoseLoad> poses_;
   Mechanics mechanics_;
   EquilibriumSolver solver_;
+  std::optional<int> most_of_each_;
   // Of Sensitivities that are gone: analysed once, ready for the next.
   std::vector<std::unique_ptr<CholeskySolver>> spare_cholesky_;
   std::vector<std::unique_ptr<LuSolver>> spare_lu_;

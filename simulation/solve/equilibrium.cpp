@@ -22,6 +22,7 @@ constexpr double crushed_step_factor = 4;  // where elements are crushed, smalle
 constexpr double squeezed_det_f = 0.1;     // an element under this is the place to look at, not the worst balance
 // Newton steps.
 constexpr int cycles_per_step = 4;      // with what else belongs to a step and its factor
+constexpr int short_stall_window = 4;   // stall_window, of solves that limit_work() bounds
 constexpr double longest_step_mm = 40;  // a step beyond this is shortened before the line search
 // Line search.
 constexpr double sufficient_decrease = 1e-4;  // Armijo constant
@@ -243,9 +244,11 @@ std::optional<Termination> EquilibriumSolver::settled(Attempt& attempt, bool by_
 }
 
 /// Whether neither residual nor energy fell much in the window that ends here. The energy of a shape far from the
-/// answer falls for long before the residual does.
+/// answer falls for long before the residual does. Of what may cost no more than so much the window is shorter: beside
+/// a fold, where two shapes meet and end, steps grow and the residual stays.
 bool EquilibriumSolver::creeps(Attempt& attempt, bool by_energy) const {
-  if (attempt.iterations % stall_window != 0) return false;
+  const int window = work_end_ == unlimited ? stall_window : short_stall_window;
+  if (attempt.iterations % window != 0) return false;
   if (attempt.iterations == 0) attempt.energy_at_start = sums_.energy;
   const double fall = attempt.energy_at_window - sums_.energy, whole = attempt.energy_at_start - sums_.energy;
   const bool falls = by_energy && fall > energy_share * whole && fall > energy_rounding * std::abs(sums_.energy);

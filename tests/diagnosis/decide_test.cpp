@@ -51,6 +51,36 @@ TEST(Decide, SeveralAreMissingAtOnceAndARivalForOneMoreIsTold) {
   EXPECT_EQ(d.ambiguous_rest, Names{"friction"});
 }
 
+TEST(Decide, AnEffectAtTheEndOfItsRangeIsSomethingElseThatLooksLikeIt) {
+  const Priors priors;
+  const auto decided_at_end = [&](const std::vector<Hypothesis>& list) {
+    auto included = inclusions(list, effects, priors);
+    for (Inclusion& one : included)
+      if (one.effect == "adhesion") one.ends_at = "adhesion.log_factor";
+    return decide(list, effects, included, little, priors, {});
+  };
+  const Diagnosis alone = decided_at_end(hypotheses({{{1}, 0.97}}));
+  EXPECT_EQ(alone.verdict, Verdict::unexplained);
+  EXPECT_EQ(alone.missing, Names{"adhesion"});
+  EXPECT_NE(alone.why.find("adhesion.log_factor"), std::string::npos) << alone.why;
+  const Diagnosis beside = decided_at_end(hypotheses({{{0, 1}, 0.98}}));
+  EXPECT_EQ(beside.missing, Names{"ligament"});
+  EXPECT_EQ(beside.ambiguous_rest, Names{"adhesion"});
+}
+
+TEST(Decide, ALocalCauseThatIsNotListedIsUnexplainedBeforeAnythingIsAmbiguous) {
+  auto list = hypotheses({{{1}, 0.6}});
+  for (Hypothesis& h : list) h.with_unlisted = {0.1, 0, 0.88};
+  const Diagnosis d = decided(list, little);
+  EXPECT_EQ(d.verdict, Verdict::unexplained);
+  EXPECT_EQ(d.missing, Names{"adhesion"});
+  EXPECT_EQ(d.ambiguous_rest, Names{"adhesion"});
+  EXPECT_NE(d.why.find("does not list has probability 0.98"), std::string::npos) << d.why;
+  list = hypotheses({{{0}, 0.97}});
+  for (Hypothesis& h : list) h.with_unlisted = {0.98, 0, 0};
+  EXPECT_EQ(decided(list, little).missing, Names{"ligament"}) << "an effect that is sure is named beside it";
+}
+
 TEST(Decide, WhatWasLeftOutCanSpeakAgainstIt) {
   const Diagnosis d = decided(hypotheses({{{0}, 0.97}}), little, -4);
   EXPECT_EQ(d.verdict, Verdict::ambiguous);
