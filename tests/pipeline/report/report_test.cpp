@@ -325,6 +325,23 @@ TEST(ReportAnswer, UnexplainedNamesTheClosestAsNoMoreThanThat) {
                {"no effect", "closest: creep"});
 }
 
+TEST(ReportAnswer, SaysWhereSomethingLocalIsThatNoEffectLists) {
+  Json unlisted = {{"probability", 0.98},
+                   {"likeliest", "tissue"},
+                   {"place_mm", {12, -40, 33}},
+                   {"times_as_stiff", 3.9},
+                   {"interval95", {2.2, 6.7}}};
+  const auto facts = [&unlisted] {
+    std::string all;
+    for (const std::string& fact : answered({{"verdict", "unexplained"}, {"unlisted", unlisted}}).facts) all += fact;
+    return all;
+  };
+  expect_words(facts(),
+               {"no effect lists has probability 0.98", "tissue about (12, -40, 33) mm is 3.9 times as stiff"});
+  unlisted["probability"] = 0.1;
+  EXPECT_EQ(facts().find("no effect lists"), std::string::npos) << "as likely as it was before";
+}
+
 TEST(ReportAnswer, BeforeTheDiagnosisItSaysWhatToRun) {
   const Answer answer = answered(nullptr);
   EXPECT_EQ(answer.kind, "not_diagnosed");
