@@ -182,7 +182,8 @@ class Diagnosis:
 
 def diagnose(case: Case, mesh: Mesh, model: Model, *, refits: int = 5, other_meshes: bool = True, seed: int = 1,
              registration_mm: float | None = None, segmentation_mm: float | None = None,
-             chest_wall_mm: float | None = None, prior: Sequence[float] = (), progress: _Progress = None) -> Diagnosis: ...
+             chest_wall_mm: float | None = None, prior: Sequence[float] = (), unlisted: float = 0.1,
+             progress: _Progress = None) -> Diagnosis: ...
 
 class Parameter:
     def __init__(self, name: str, *, unit: str = "1", null: float = 0.0, lower: float, upper: float, median: float = 0.0,
