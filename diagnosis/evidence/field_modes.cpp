@@ -6,6 +6,13 @@
 
 namespace supine::diagnosis {
 
+Points middles(const Points& points, const Indices& nodes, int corners) {
+  Points middle = Points::Zero(nodes.rows(), 3);
+  for (Eigen::Index e = 0; e < nodes.rows(); ++e)
+    for (int a = 0; a < corners; ++a) middle.row(e) += points.row(nodes(e, a)) / corners;
+  return middle;
+}
+
 std::vector<int> spread_out(const Points& points, int most) {
   std::vector<int> chosen{0};
   Eigen::VectorXd gap = (points.rowwise() - points.row(0)).rowwise().norm();

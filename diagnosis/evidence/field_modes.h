@@ -8,6 +8,9 @@
 
 namespace supine::diagnosis {
 
+/// Means of the first @p corners nodes of each element, #elements by 3.
+Points middles(const Points& points, const Indices& nodes, int corners);
+
 /// Rows that lie as far from each other as they can, from the first on; at most @p most, fewer where points coincide.
 std::vector<int> spread_out(const Points& points, int most);
 

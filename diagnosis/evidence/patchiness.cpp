@@ -15,13 +15,6 @@ using simulation::PoseLoad;
 
 constexpr int most_shapes = 40;  // of each field
 
-Points middles(const Points& points, const Indices& nodes, int corners) {
-  Points middle = Points::Zero(nodes.rows(), 3);
-  for (Eigen::Index e = 0; e < nodes.rows(); ++e)
-    for (int a = 0; a < corners; ++a) middle.row(e) += points.row(nodes(e, a)) / corners;
-  return middle;
-}
-
 Eigen::MatrixXd tissue_fields(const meshing::TetMesh& mesh, const Patchiness& size) {
   Eigen::VectorXd volume(mesh.cells.rows());
   for (Eigen::Index c = 0; c < volume.size(); ++c) volume[c] = meshing::cell_volume_mm3(mesh.points, mesh.cells, c);

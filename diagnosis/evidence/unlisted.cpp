@@ -24,13 +24,6 @@ constexpr int most_places = 50;                  // of each kind
 constexpr std::array<double, 3> sizes{2, 4, 8};  // standard deviations of the field
 constexpr double out_of_sight = 60;              // of the logarithm: no gain lifts a hypothesis from so far below
 
-Points middles(const Points& points, const Indices& nodes, int corners) {
-  Points middle = Points::Zero(nodes.rows(), 3);
-  for (Index e = 0; e < nodes.rows(); ++e)
-    for (int a = 0; a < corners; ++a) middle.row(e) += points.row(nodes(e, a)) / corners;
-  return middle;
-}
-
 /// Where the points of the interface lie: those of one face in its middle.
 Points interface_places(const simulation::Mechanics& mechanics) {
   const simulation::FaceGroup& group = mechanics.layout().interface;
