@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulation/catalogue.h"
 #include "simulation/parameters.h"
 
 namespace supine::diagnosis {
@@ -30,7 +31,7 @@ std::vector<Candidate> lacking_effects(const simulation::Model& model, const mes
                                        const meshing::Anatomy& anatomy) {
   std::vector<Candidate> all;
   for (const Effect* effect : simulation::catalogue()) {
-    if (has(model, *effect) || !effect->belongs_to(mesh, anatomy, model)) continue;
+    if (simulation::is_stand_in(*effect) || has(model, *effect) || !effect->belongs_to(mesh, anatomy, model)) continue;
     Candidate candidate{effect->name(), {}, {}, {}};
     for (const Parameter& row : effect->parameters())
       if (!row.shape)

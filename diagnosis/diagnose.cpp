@@ -17,10 +17,22 @@ constexpr double held_by_the_set = 0.95;
 constexpr double nothing_unlikely = 0.5, nothing_excluded = 0.25, speaks_against = -3;
 constexpr std::size_t most_named = 6;
 
+/// Neither an effect nor a local cause that is not listed.
 double probability_of_nothing(const std::vector<Hypothesis>& hypotheses) {
   double sum = 0;
+  for (const Hypothesis& h : hypotheses) {
+    if (!h.effects.empty()) continue;
+    double alone = 1;
+    for (const double share : h.with_unlisted) alone -= share;
+    sum += h.probability * std::max(0.0, alone);
+  }
+  return sum;
+}
+
+double probability_of_some_effect(const std::vector<Hypothesis>& hypotheses) {
+  double sum = 0;
   for (const Hypothesis& h : hypotheses)
-    if (h.effects.empty()) sum += h.probability;
+    if (!h.effects.empty()) sum += h.probability;
   return sum;
 }
 
@@ -34,6 +46,11 @@ double probability_of_unlisted(const std::vector<Hypothesis>& hypotheses) {
 bool is_measurement(const std::string& effect) {
   const auto kind = simulation::traits_of(effect).kind;
   return kind == simulation::EffectKind::measurement || kind == simulation::EffectKind::numerical;
+}
+
+/// Whether a local cause has a Bayes factor of settling_factor or more.
+bool is_likelier_than_before(double now, double before) {
+  return before > 0 && now / std::max(1 - now, 1e-9) >= settling_factor * before / (1 - before);
 }
 
 /// Expected, and neither found nor excluded.
@@ -95,7 +112,7 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
                  const std::vector<Inclusion>& included, const Unexplained& unexplained, const Priors& priors,
                  const std::vector<std::string>& unseen) {
   Diagnosis result;
-  const double nothing = probability_of_nothing(hypotheses);
+  const double nothing = probability_of_nothing(hypotheses), local = probability_of_unlisted(hypotheses);
   std::vector<std::string> denied;
   std::vector<Inclusion> at_end;
   for (const Inclusion& one : included) {
@@ -121,13 +138,12 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
                              at_end.front().ends_at);
     return result;
   }
-  if (probability_of_unlisted(hypotheses) >= priors.named_at) {
+  if (local >= priors.named_at) {
     result.verdict = Verdict::unexplained;
     if (!included.empty()) result.missing = {included.front().effect};
     result.ambiguous_rest = likely_effects(hypotheses, effects, included,
                                            [](const Inclusion& one) { return one.bayes_factor >= settling_factor; });
-    result.why = fmt::format("a local cause that the catalogue does not list has probability {:.2f}",
-                             probability_of_unlisted(hypotheses));
+    result.why = fmt::format("a local cause that the catalogue does not list has probability {:.2f}", local);
     return result;
   }
   const bool some = !included.empty() && included.front().probability > 0 &&
@@ -139,7 +155,16 @@ Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<st
   for (const Inclusion& one : included)
     if (is_left_open(priors, one) && std::find(unseen.begin(), unseen.end(), one.effect) != unseen.end())
       undecided.push_back(one.effect);
-  const bool likely = (some && nothing < nothing_unlikely) || nothing < nothing_excluded;
+  const bool locally = is_likelier_than_before(local, priors.unlisted);
+  const bool likely = ((some || locally) && nothing < nothing_unlikely) || nothing < nothing_excluded;
+  if (likely && locally && denied.empty() && undecided.empty() && local > probability_of_some_effect(hypotheses)) {
+    result.verdict = Verdict::unexplained;
+    if (!included.empty()) result.missing = {included.front().effect};
+    result.why = fmt::format(
+        "something local that the catalogue does not list has probability {:.2f}, that nothing is missing {:.2f}",
+        local, nothing);
+    return result;
+  }
   if (likely || !undecided.empty()) {
     result.verdict = Verdict::ambiguous;
     const bool expected =

@@ -43,11 +43,14 @@ std::vector<Inclusion> inclusions(const std::vector<Hypothesis>& hypotheses, con
 ///                    against it by 3 or more, and none of its numbers ended at an end of its range
 ///   unexplained      an effect would be missing but for such a number: so large, steep or narrow it is something else
 ///   unexplained      a local cause that no effect lists has priors.named_at or more (unlisted.h)
+///   unexplained      a local cause has a Bayes factor of 3 or more and is likelier than all effects together, and
+///                    "nothing" has less than 0.5
 ///   ambiguous        "nothing" has less than 0.5 and some Bayes factor is 3 or more or an expected effect is likelier
 ///                    than nothing, or "nothing" has less than 0.25, or an expected effect is neither found nor
 ///                    excluded and cannot be seen; expected effects that are neither are named with the others
 ///   unexplained      the lower end of what is unexplained is above priors.unexplained_bound_mm
 ///   nothing_missing  otherwise
+/// "Nothing" is neither an effect nor such a cause.
 /// @param included  of these hypotheses, most probable first
 /// @param unseen    effects that the scan could not show if they were there (not_seen() of the score test)
 Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& effects,

@@ -10,6 +10,7 @@
 #include "common/rms.h"
 #include "common/statistics.h"
 #include "diagnosis/evidence/left_out.h"
+#include "diagnosis/evidence/local_fit.h"
 #include "diagnosis/follow.h"
 #include "diagnosis/stand_in.h"
 #include "simulation/parameters.h"
@@ -123,6 +124,13 @@ std::vector<ScanPlace> find_places(const Subject& subject, const Findings& found
   return places;
 }
 
+/// Local causes along lines lose to effects that were followed; the likeliest are followed too.
+void follow_local(const Subject& subject, const ExamineOptions& options, Findings& found) {
+  tell(options, "local causes");
+  const auto followed = follow_local_causes(subject.scene, subject.given, found.base, options.priors, found.hypotheses);
+  if (!followed.empty()) found.unlisted = weigh_unlisted(found.base, options.priors, found.hypotheses, followed);
+}
+
 }  // namespace
 
 const Inclusion& Findings::included_of(const std::string& effect) const {
@@ -182,6 +190,7 @@ std::unique_ptr<Findings> examine(const Subject& subject, const ExamineOptions& 
   found->held_out_rms_mm = held_out_rms(found->base, nothing_of(*found), fit.residuals);
   follow(subject, options, *found);
   found->unlisted = weigh_unlisted(found->base, options.priors, found->hypotheses);
+  if (options.refits > 0) follow_local(subject, options, *found);
   found->included = inclusions(found->hypotheses, found->effects(), options.priors);
   ask_what_was_left_out(subject, *found);
   note_range_ends(*found);

@@ -14,6 +14,7 @@
 #include "simulation/effects/incompressibility.h"
 #include "simulation/effects/left_right_stiffness.h"
 #include "simulation/effects/ligament.h"
+#include "simulation/effects/local_stiffness.h"
 #include "simulation/effects/misregistration.h"
 #include "simulation/effects/part_stiffness.h"
 #include "simulation/effects/segmentation_offset.h"
@@ -53,6 +54,7 @@ std::vector<const Effect*>& entries() {
   static const PartStiffness part_stiffness;
   static const SupportCompliance support_compliance;
   static const StiffnessGradient stiffness_gradient;
+  static const LocalStiffness local_stiffness;
   static const LeftRightStiffness left_right_stiffness;
   static const SkinPrestretch skin_prestretch;
   static const SkinStiffening skin_stiffening;
@@ -74,6 +76,7 @@ std::vector<const Effect*>& entries() {
                                            &tumour,
                                            &part_stiffness,
                                            &stiffness_gradient,
+                                           &local_stiffness,
                                            &left_right_stiffness,
                                            &skin_prestretch,
                                            &skin_stiffening,
@@ -112,6 +115,8 @@ bool is_measurement_effect(const std::string& effect) {
   const EffectKind kind = traits_of(effect).kind;
   return kind == EffectKind::measurement || kind == EffectKind::numerical;
 }
+
+bool is_stand_in(const Effect& effect) { return dynamic_cast<const LocalStiffness*>(&effect) != nullptr; }
 
 const Effect& place_of_scan() {
   return **std::find_if(catalogue().begin(), catalogue().end(),

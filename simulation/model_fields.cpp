@@ -183,9 +183,8 @@ void check_effects_act(const Model& model, const Scene& scene) {
               .c_str());
     if (effect != nullptr && !effect->belongs_to(scene.mesh, scene.anatomy, model))
       refuse(
-          "the body has not what it is about (a breast's anatomy, a named part, a named support that does not slide); "
-          "remove the "
-          "effect");
+          "the body has not what it is about (a breast's anatomy, two breasts, a named part, a named support that does "
+          "not slide); remove the effect");
     const char* unread = nullptr;
     bool acts = false;
     for (const std::string& column : changed_columns(model, setting, scene)) {
@@ -194,11 +193,9 @@ void check_effects_act(const Model& model, const Scene& scene) {
       if (unread == nullptr) unread = reason;
     }
     if (acts) continue;
-    refuse(
-        unread != nullptr
-            ? unread
-            : "the mesh has no tissue of its kind or one breast only, or nothing lies where it acts (offset_mm, arc); "
-              "remove the effect");
+    refuse(unread != nullptr ? unread
+                             : "the mesh has no tissue of its kind, or nothing lies where it acts (offset_mm, arc); "
+                               "remove the effect");
   }
 }
 

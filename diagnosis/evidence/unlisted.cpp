@@ -6,12 +6,14 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <tuple>
 
 #include "common/log_sum.h"
 #include "common/statistics.h"
 #include "diagnosis/evidence/base_fit.h"
 #include "diagnosis/evidence/field_modes.h"
 #include "diagnosis/evidence/hypotheses.h"
+#include "simulation/effects/local_stiffness.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -20,9 +22,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int most_places = 50;                  // of each kind
-constexpr std::array<double, 3> sizes{2, 4, 8};  // standard deviations of the field
-constexpr double out_of_sight = 60;              // of the logarithm: no gain lifts a hypothesis from so far below
+constexpr int most_places = 50;  // of each kind
+const auto& sizes = local_cause_sizes;
+constexpr double out_of_sight = 60;  // of the logarithm: no gain lifts a hypothesis from so far below
 
 /// Where the points of the interface lie: those of one face in its middle.
 Points interface_places(const simulation::Mechanics& mechanics) {
@@ -34,9 +36,24 @@ Points interface_places(const simulation::Mechanics& mechanics) {
   return places;
 }
 
-/// Adds the bumps of one field. @param shapes  what its modes do  @param modes  of it at @p places
-void add_bumps(LocalKind kind, const MatrixXd& shapes, const MatrixXd& modes, const Points& places, double unit,
+/// Where the elements of one field lie.
+struct FieldPlaces {
+  Points mm, anatomy;
+};
+
+/// Of cells or faces: the middles of their first @p corners nodes.
+FieldPlaces places_of(const simulation::Mechanics& mechanics, const Indices& nodes, int corners) {
+  const simulation::Scene scene{mechanics.mesh(), mechanics.anatomy(), mechanics.layout(), ""};
+  FieldPlaces places{middles(mechanics.mesh().points, nodes, corners), Points(nodes.rows(), 3)};
+  for (Index e = 0; e < nodes.rows(); ++e)
+    places.anatomy.row(e) = simulation::anatomy_place(scene, nodes.row(e).head(corners)).transpose();
+  return places;
+}
+
+/// Adds the bumps of one field. @param shapes  what its modes do  @param modes  of it at @p where
+void add_bumps(LocalKind kind, const MatrixXd& shapes, const MatrixXd& modes, const FieldPlaces& where, double unit,
                LocalCauses& all) {
+  const Points& places = where.mm;
   if (places.rows() == 0 || modes.cols() == 0 || !(unit > 0)) return;
   const std::vector<int> centres = spread_out(places, most_places);
   for (const int centre : centres) {
@@ -48,6 +65,8 @@ void add_bumps(LocalKind kind, const MatrixXd& shapes, const MatrixXd& modes, co
     all.kind.push_back(kind);
     all.place.conservativeResize(k + 1, 3);
     all.place.row(k) = places.row(centre);
+    all.anatomy.conservativeResize(k + 1, 3);
+    all.anatomy.row(k) = where.anatomy.row(centre);
     all.unit.conservativeResize(k + 1);
     all.unit[k] = unit;
   }
@@ -144,24 +163,54 @@ std::pair<double, double> size_of(const OneMore& more, const Hypothesis& h, Inde
   return {mean, std::sqrt(std::max(0.0, second / sum - mean * mean))};
 }
 
-/// Place and size of the likeliest cause of the likeliest kind.
-void tell_likeliest(const LocalCauses& causes, const OneMore& more, const Hypothesis& h, Unlisted& found) {
-  found.kind =
-      static_cast<LocalKind>(std::max_element(found.by_kind.begin(), found.by_kind.end()) - found.by_kind.begin());
-  const VectorXd gain = over_sizes(more, h);
+/// The likeliest place of a kind; -1 where it has none.
+Index likeliest_of(const LocalCauses& causes, const VectorXd& gain, LocalKind kind) {
   Index best = -1;
   for (Index c = 0; c < gain.size(); ++c)
-    if (causes.kind[static_cast<std::size_t>(c)] == found.kind && (best < 0 || gain[c] > gain[best])) best = c;
-  if (best < 0) return;
-  found.place_mm = causes.place.row(best);
+    if (causes.kind[static_cast<std::size_t>(c)] == kind && (best < 0 || gain[c] > gain[best])) best = c;
+  return best;
+}
+
+/// What following showed of a kind, beside what lines say of all its places.
+void take_followed(const std::vector<FollowedCause>& followed, std::array<double, local_kinds>& of_kind) {
+  for (const FollowedCause& one : followed) {
+    double& gain = of_kind[static_cast<std::size_t>(one.kind)];
+    gain = std::max(gain, one.ln_gain);
+  }
+}
+
+/// rms distance of the places of a kind from one of them, each as likely as it is.
+double spread_about(const LocalCauses& causes, const VectorXd& gain, Index best) {
+  const auto at = [&causes](Index c) { return causes.kind[static_cast<std::size_t>(c)]; };
   double weights = 0, spread = 0;
   for (Index c = 0; c < gain.size(); ++c) {
-    if (causes.kind[static_cast<std::size_t>(c)] != found.kind) continue;
+    if (at(c) != at(best)) continue;
     const double weight = std::exp(gain[c] - gain[best]);
     weights += weight;
     spread += weight * (causes.place.row(c) - causes.place.row(best)).squaredNorm();
   }
-  found.within_mm = std::sqrt(spread / weights);
+  return std::sqrt(spread / weights);
+}
+
+/// Place and size of the likeliest cause of the likeliest kind.
+void tell_likeliest(const LocalCauses& causes, const OneMore& more, const Hypothesis& h,
+                    const std::vector<FollowedCause>& followed, Unlisted& found) {
+  found.kind =
+      static_cast<LocalKind>(std::max_element(found.by_kind.begin(), found.by_kind.end()) - found.by_kind.begin());
+  const VectorXd gain = over_sizes(more, h);
+  const Index best = likeliest_of(causes, gain, found.kind);
+  if (best < 0) return;
+  const auto known = std::find_if(followed.begin(), followed.end(),
+                                  [&found](const FollowedCause& one) { return one.kind == found.kind; });
+  if (h.effects.empty() && known != followed.end() &&
+      known->ln_gain > over_places(causes, gain)[static_cast<std::size_t>(found.kind)]) {
+    found.place_mm = known->place_mm, found.within_mm = known->within_mm;
+    found.size = known->size, found.low = known->low, found.high = known->high;
+    found.effect = known->effect;
+    return;
+  }
+  found.within_mm = spread_about(causes, gain, best);
+  found.place_mm = causes.place.row(best);
   const auto [mean, sd] = size_of(more, h, best);
   found.size = causes.unit[best] * mean;
   found.low = causes.unit[best] * (mean - normal_reach95() * sd);
@@ -197,17 +246,18 @@ std::string local_kind_name(LocalKind kind) {
 LocalCauses local_causes(const simulation::Mechanics& mechanics, const Patchiness& patchiness, const MatrixXd& shapes) {
   const PatchyFields fields = patchy_fields(mechanics, patchiness);
   const meshing::TetMesh& mesh = mechanics.mesh();
+  const Points muscle = interface_places(mechanics);
   LocalCauses all;
   all.columns.resize(shapes.rows(), 0);
   Index from = 0;
-  const auto add = [&](LocalKind kind, const MatrixXd& modes, const Points& places, double unit) {
+  const auto add = [&](LocalKind kind, const MatrixXd& modes, const FieldPlaces& places, double unit) {
     add_bumps(kind, shapes.middleCols(from, modes.cols()), modes, places, unit, all);
     from += modes.cols();
   };
-  add(LocalKind::tissue, fields.tissue, middles(mesh.points, mesh.cells, 4), patchiness.tissue);
-  add(LocalKind::skin, fields.skin, middles(mesh.points, mesh.faces(mechanics.layout().skin.faces, Eigen::all), 3),
+  add(LocalKind::tissue, fields.tissue, places_of(mechanics, mesh.cells, 4), patchiness.tissue);
+  add(LocalKind::skin, fields.skin, places_of(mechanics, mesh.faces(mechanics.layout().skin.faces, Eigen::all), 3),
       patchiness.skin);
-  add(LocalKind::muscle, fields.muscle, interface_places(mechanics), patchiness.muscle_mm);
+  add(LocalKind::muscle, fields.muscle, {muscle, Points::Zero(muscle.rows(), 3)}, patchiness.muscle_mm);
   return all;
 }
 
@@ -216,7 +266,24 @@ VectorXd ln_gain_of_one_more(const LinearEvidence& evidence, const std::vector<i
   return ln_gain(OneMore(evidence, columns), which, weighed, sd);
 }
 
-Unlisted weigh_unlisted(const BaseFit& base, const Priors& priors, std::vector<Hypothesis>& hypotheses) {
+std::array<LikeliestCause, local_kinds> likeliest_causes(const LocalCauses& causes, const Hypothesis& h) {
+  std::array<LikeliestCause, local_kinds> found;
+  if (causes.columns.cols() == 0) return found;
+  const OneMore more(*h.evidence, causes.columns);
+  const VectorXd gain = over_sizes(more, h);
+  const auto mean = over_places(causes, gain);
+  for (std::size_t kind = 0; kind < local_kinds; ++kind) {
+    LikeliestCause& one = found[kind];
+    one.cause = likeliest_of(causes, gain, static_cast<LocalKind>(kind));
+    if (one.cause < 0) continue;
+    one.ln_gain = gain[one.cause], one.ln_of_kind = mean[kind];
+    std::tie(one.size, one.sd) = size_of(more, h, one.cause);
+  }
+  return found;
+}
+
+Unlisted weigh_unlisted(const BaseFit& base, const Priors& priors, std::vector<Hypothesis>& hypotheses,
+                        const std::vector<FollowedCause>& followed) {
   Unlisted found;
   if (base.local.columns.cols() == 0 || !(priors.unlisted > 0)) return found;
   double most = -std::numeric_limits<double>::infinity();
@@ -227,6 +294,7 @@ Unlisted weigh_unlisted(const BaseFit& base, const Priors& priors, std::vector<H
     if (ln_weight(h) > most - out_of_sight || h.effects.empty()) {
       const auto more = by_evidence.try_emplace(h.evidence.get(), *h.evidence, base.local.columns).first;
       gain = over_places(base.local, over_sizes(more->second, h));
+      if (h.effects.empty()) take_followed(followed, gain);
     }
     weigh_beside(priors.unlisted, gain, h);
   }
@@ -238,7 +306,7 @@ Unlisted weigh_unlisted(const BaseFit& base, const Priors& priors, std::vector<H
   }
   found.probability = sum_of(found.by_kind);
   const auto more = by_evidence.find(beside->evidence.get());
-  if (more != by_evidence.end()) tell_likeliest(base.local, more->second, *beside, found);
+  if (more != by_evidence.end()) tell_likeliest(base.local, more->second, *beside, followed, found);
   return found;
 }
 

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "diagnosis/evidence/linear_evidence.h"
 #include "diagnosis/evidence/patchiness.h"
+#include "simulation/model.h"
 
 namespace supine::diagnosis {
 
@@ -17,6 +19,8 @@ struct Priors;
 /// Kinds of local causes that no effect lists, and how many there are.
 enum class LocalKind { tissue, skin, muscle };
 inline constexpr std::size_t local_kinds = 3;
+/// Standard deviations of a cause's size about nothing, each alike, in those of its field.
+inline constexpr std::array<double, 3> local_cause_sizes{2, 4, 8};
 /// "tissue", "skin", "muscle".
 std::string local_kind_name(LocalKind kind);
 
@@ -28,12 +32,23 @@ struct LocalCauses {
                                 ///< clusters, #clusters by #causes
   std::vector<LocalKind> kind;  ///< of each
   Points place;                 ///< of each, mm, in the imaged shape
+  Points anatomy;               ///< of tissue and skin: lateral, head, height over the muscle, in foot radii
   Eigen::VectorXd unit;         ///< the standard deviation: of ln of the stiffness, of the muscle's place mm
 };
 
 /// @param shapes  patchiness_shapes() over the clusters, of the same @p mechanics and @p patchiness
 LocalCauses local_causes(const simulation::Mechanics& mechanics, const Patchiness& patchiness,
                          const Eigen::MatrixXd& shapes);
+
+/// A local cause that was followed through the chain, its place and width free (local_fit.h), beside nothing else.
+struct FollowedCause {
+  LocalKind kind = LocalKind::tissue;
+  double ln_gain = 0;  ///< of the evidence with it, at any place and of any size, over that without
+  Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();
+  double within_mm = 0;                   ///< 1 sigma of the place, rms over the three directions, times √3
+  double size = 0, low = 0, high = 0;     ///< ln of how many times as stiff; 95 %
+  simulation::EffectSetting effect = {};  ///< as an effect of a model, where the fit ended
+};
 
 /// How likely a cause is there that no effect lists, whatever else is.
 struct Unlisted {
@@ -44,14 +59,26 @@ struct Unlisted {
   Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();
   double within_mm = 0;                ///< rms distance of the other places of its kind, each as likely as it is
   double size = 0, low = 0, high = 0;  ///< ln of how many times as stiff; mm outward of the muscle; 95 %
+  std::optional<simulation::EffectSetting> effect = {};  ///< that it is in a model; none where it was not followed
 };
 
 /// Whether one such cause more is there, beside each hypothesis: before, with Priors::unlisted, of each kind and at
 /// each place alike, of a size that is normal about nothing with 2, 4 or 8 standard deviations of its field (any of
 /// these alike). Along straight lines from the base fit; of a hypothesis that was refitted beside its own numbers.
 /// Fills Hypothesis::ln_unlisted and with_unlisted of those that may count, and the probabilities anew.
+/// @param followed  beside nothing: counts where that is more than lines say of its kind
 /// @pre  hypotheses are weighed, base.local is filled
-Unlisted weigh_unlisted(const BaseFit& base, const Priors& priors, std::vector<Hypothesis>& hypotheses);
+Unlisted weigh_unlisted(const BaseFit& base, const Priors& priors, std::vector<Hypothesis>& hypotheses,
+                        const std::vector<FollowedCause>& followed = {});
+
+/// The likeliest cause of each kind beside a hypothesis, along straight lines.
+struct LikeliestCause {
+  Eigen::Index cause = -1;  ///< row of the local causes; -1 where there is none of the kind
+  double ln_gain = 0;       ///< over all sizes it may have
+  double ln_of_kind = 0;    ///< the mean over the places of the kind
+  double size = 0, sd = 0;  ///< in standard deviations of its field
+};
+std::array<LikeliestCause, local_kinds> likeliest_causes(const LocalCauses& causes, const Hypothesis& h);
 
 /// ln of how much likelier the distances are where one number more may be anything, for each of @p columns: normal
 /// about 0 with @p sd. One-sided numbers keep the mass they have without it.

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -79,10 +80,30 @@ std::size_t block_end(const std::vector<std::string>& lines, std::size_t begin) 
 
 /// Everything free within its range and about its usual value, as the diagnosis refits the effect: a strength found
 /// with another place than the file has would be another strength.
-std::string parameter_line(const Parameter& row) {
+std::string parameter_line(const Parameter& row, double value) {
   const std::string comment = fmt::format("# {}{}", row.meaning, row.unit == "1" ? "" : ", " + row.unit);
-  return fmt::format("{} = {{ value = {}, prior_sd = {:.3g}, lower = {}, upper = {} }}  {}\n", row.name, row.median,
+  return fmt::format("{} = {{ value = {}, prior_sd = {:.3g}, lower = {}, upper = {} }}  {}\n", row.name, value,
                      simulation::prior_sd(row), row.lower, row.upper, comment);
+}
+
+/// A number chosen for a parameter. @throws InputError  no number, one outside the range
+double chosen_number(const Effect& effect, const Parameter& row, const std::string& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= row.lower && value <= row.upper))
+    throw InputError(fmt::format("{}.{} = {}: must be a number from {} to {}{}", effect.name(), row.name, text,
+                                 row.lower, row.upper, row.unit == "1" ? "" : " " + row.unit));
+  return value;
+}
+
+/// @throws InputError  a name that the effect does not have
+void check_names(const Effect& effect, const std::map<std::string, std::string>& chosen) {
+  std::vector<std::string> names;
+  for (const Parameter& row : effect.parameters()) names.push_back(row.name);
+  for (const auto& option : effect.options()) names.push_back(option.name);
+  for (const auto& [name, value] : chosen)
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      throw InputError(fmt::format("{} has no \"{}\"; it has {}", effect.name(), name, listed(names)));
 }
 
 /// The table that holds the section of a parameter: "breast" of the file, or the [[effect]] of that name.
@@ -124,23 +145,33 @@ std::size_t byte_of(const std::string& line, std::size_t column) {
 
 }  // namespace
 
-std::string effect_block(const Effect& effect) {
+std::string effect_block(const Effect& effect, const std::map<std::string, std::string>& chosen) {
+  check_names(effect, chosen);
   std::string block = fmt::format("[[effect]]  # {}\nname = \"{}\"\n", effect.meaning(), effect.name());
-  for (const Parameter& row : effect.parameters()) block += parameter_line(row);
-  for (const auto& option : effect.options())
-    block += fmt::format("{} = \"{}\"  # {}: {}\n", option.name, option.default_value,
+  for (const Parameter& row : effect.parameters()) {
+    const auto own = chosen.find(row.name);
+    block += parameter_line(row, own == chosen.end() ? row.median : chosen_number(effect, row, own->second));
+  }
+  for (const auto& option : effect.options()) {
+    const auto own = chosen.find(option.name);
+    const std::string& value = own == chosen.end() ? option.default_value : own->second;
+    if (!option.values.empty() && std::find(option.values.begin(), option.values.end(), value) == option.values.end())
+      throw InputError(fmt::format("{}.{} = {}: must be {}", effect.name(), option.name, value, listed(option.values)));
+    block += fmt::format("{} = \"{}\"  # {}: {}\n", option.name, value,
                          option.values.empty() ? "a name" : listed(option.values), option.meaning);
+  }
   return block;
 }
 
-std::string with_effect(const ModelText& model, const std::string& name) {
+std::string with_effect(const ModelText& model, const std::string& name,
+                        const std::map<std::string, std::string>& chosen) {
   const Effect& effect = known_effect(name);
   if (const int line = effect_line(model, name); line >= 0)
     throw InputError(fmt::format("{}:{}: the effect {} is there already; change its values, or remove it first",
                                  model.file.string(), line + 1, name));
   std::string text = model.text;
   if (!text.empty() && text.back() != '\n') text += '\n';
-  return text + effect_block(effect);
+  return text + effect_block(effect, chosen);
 }
 
 std::string without_effect(const ModelText& model, const std::string& name) {

@@ -11,11 +11,15 @@ namespace supine::pipeline {
 
 /// The [[effect]] block that stands for @p effect in a model.toml: everything free, from the catalogue's median
 /// with the catalogue's spread and bounds; units and meanings as comments.
-std::string effect_block(const simulation::Effect& effect);
+/// @param chosen  in place of medians and defaults: of a parameter a number, of an option its value, by name
+/// @throws InputError  the effect has no such name, a value it cannot have
+std::string effect_block(const simulation::Effect& effect, const std::map<std::string, std::string>& chosen = {});
 
 /// The text of a model.toml with the effect added at the end; everything else, comments too, stays byte for byte.
-/// @throws InputError  unknown effect, effect in the text already, no TOML
-std::string with_effect(const ModelText& model, const std::string& name);
+/// @param chosen  as in effect_block()
+/// @throws InputError  unknown effect, effect in the text already, no TOML, as effect_block()
+std::string with_effect(const ModelText& model, const std::string& name,
+                        const std::map<std::string, std::string>& chosen = {});
 
 /// The text of a model.toml without the block of the effect: from its [[effect]] line to the next table. Comments
 /// that stand right above the next table belong to that and stay.

@@ -44,6 +44,7 @@ class ModelTool : public Tool {
            "  supine-model list\n"
            "  supine-model show mycase/model.toml\n"
            "  supine-model add ligament mycase/model.toml\n"
+           "  supine-model add ligament mycase/model.toml --with arc=lower --with width_mm=20\n"
            "  supine-model remove ligament mycase/model.toml\n";
   }
 
@@ -53,6 +54,8 @@ class ModelTool : public Tool {
         ->check(CLI::IsMember({"start", "list", "show", "add", "remove"}));
     app.add_option("arguments", arguments_, "start: CASE mesh.vtu; show: model.toml; add, remove: EFFECT model.toml")
         ->expected(0, 2);
+    app.add_option("--with", with_, "add: NAME=VALUE of a number or an option of the effect, in place of the usual one")
+        ->type_name("NAME=VALUE");
   }
 
   Outcome run(Run& run) override {
@@ -63,6 +66,8 @@ class ModelTool : public Tool {
                                    : wanted == 1        ? "a model file"
                                    : action_ == "start" ? "a case folder and its mesh"
                                                         : "an effect and a model file"));
+    if (!with_.empty() && action_ != "add")
+      throw InputError("--with belongs to add: it says what an effect begins with");
     if (action_ == "list")
       list(run);
     else if (action_ == "show")
@@ -134,12 +139,24 @@ class ModelTool : public Tool {
     run.say(fmt::format("{} fits a breast {:.0f} mm high", target.string(), height_mm));
   }
 
+  /// What --with names. @throws InputError  no NAME=VALUE
+  std::map<std::string, std::string> chosen() const {
+    std::map<std::string, std::string> values;
+    for (const std::string& one : with_) {
+      const auto equals = one.find('=');
+      if (equals == 0 || equals == std::string::npos || equals + 1 == one.size())
+        throw InputError(fmt::format("--with {}: must be NAME=VALUE, such as width_mm=20", one));
+      values[one.substr(0, equals)] = one.substr(equals + 1);
+    }
+    return values;
+  }
+
   void edit(Run& run) {
     const std::string& effect = arguments_[0];
     const fs::path file = arguments_[1];
     const fs::path target = output.empty() ? file : output;
     const ModelText given = read_model_text(file);
-    const std::string text = action_ == "add" ? with_effect(given, effect) : without_effect(given, effect);
+    const std::string text = action_ == "add" ? with_effect(given, effect, chosen()) : without_effect(given, effect);
     // Changing the named file is what was asked for, so only another target needs --force.
     Outputs outputs(output.empty() || run.force());
     const fs::path temporary = outputs.stage(target);
@@ -150,7 +167,7 @@ class ModelTool : public Tool {
   }
 
   std::string action_;
-  std::vector<std::string> arguments_;
+  std::vector<std::string> arguments_, with_;
 };
 
 }  // namespace

@@ -120,7 +120,13 @@ Json unlisted_json(const diagnosis::Unlisted& found) {
     kinds[diagnosis::local_kind_name(static_cast<diagnosis::LocalKind>(kind))] = found.by_kind[kind];
   const bool moved = found.kind == diagnosis::LocalKind::muscle;
   const auto value = [moved](double size) { return moved ? size : std::exp(size); };
+  Json effect;
+  if (found.effect) {
+    for (const auto& [name, number] : found.effect->parameters) effect[name] = number.value;
+    for (const auto& [name, option] : found.effect->options) effect[name] = option;
+  }
   return {{"probability", found.probability},
+          {"effect", effect},
           {"by_kind", kinds},
           {"likeliest", diagnosis::local_kind_name(found.kind)},
           {"place_mm", {found.place_mm.x(), found.place_mm.y(), found.place_mm.z()}},

@@ -79,9 +79,10 @@ void say_hypotheses(const Run& run, const Findings& found) {
     std::vector<std::string> names;
     for (const int effect : one->effects) names.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);
     const Refit* refit = names.empty() ? nullptr : found.refit_of(names);
+    const char* none = found.unlisted.probability < worth_telling ? "nothing missing" : "nothing that is listed";
     run.say(fmt::format("  {:<34}{:>6.2f}      unexplained {:.1f} mm [{:.1f}, {:.1f}]     {}",
-                        names.empty() ? "nothing missing" : joined(names, " + "), one->probability, left.mean_mm,
-                        left.low_mm, left.high_mm, refit ? values_of(refit->parameters) : ""));
+                        names.empty() ? none : joined(names, " + "), one->probability, left.mean_mm, left.low_mm,
+                        left.high_mm, refit ? values_of(refit->parameters) : ""));
   }
 }
 
@@ -97,6 +98,14 @@ void say_unlisted(const Run& run, const Findings& found) {
                                              std::exp(u.low), std::exp(u.high));
   run.say(fmt::format("  {:<34}{:>6.2f}      the {} {} {}", "something local that is not listed", u.probability,
                       diagnosis::local_kind_name(u.kind), place, size));
+}
+
+/// How the local cause is put into a model.
+void say_how_to_add(const Run& run, const simulation::EffectSetting& effect) {
+  std::string numbers;
+  for (const auto& [name, value] : effect.options) numbers += fmt::format(" --with {}={}", name, value);
+  for (const auto& [name, number] : effect.parameters) numbers += fmt::format(" --with {}={:.3g}", name, number.value);
+  run.say(fmt::format("  try it:   supine-model add {} model.toml{} && make CASE=... calibrate", effect.name, numbers));
 }
 
 std::string where(const std::vector<diagnosis::HotSpot>& spots) {
@@ -217,6 +226,8 @@ void say_limits(const Run& run, const DiagnosisResult& result) {
         found.budget.numerical, result.finer_triangles));
   if (found.diagnosis.verdict == Verdict::missing)
     run.say(fmt::format("  add it:   supine-model add {} model.toml && make CASE=... calibrate", set[0]));
+  if (found.diagnosis.verdict == Verdict::unexplained && found.unlisted.effect)
+    say_how_to_add(run, *found.unlisted.effect);
 }
 
 }  // namespace

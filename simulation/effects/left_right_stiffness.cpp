@@ -17,6 +17,10 @@ const std::vector<Parameter>& LeftRightStiffness::parameters() const {
   return rows;
 }
 
+bool LeftRightStiffness::belongs_to(const meshing::TetMesh&, const meshing::Anatomy& anatomy, const Model&) const {
+  return !anatomy.breasts.empty();
+}
+
 void LeftRightStiffness::apply(const Scene& scene, std::span<const Dual> values,
                                const std::map<std::string, std::string>&, Fields<Dual>& fields) const {
   if (scene.anatomy.breasts.empty()) return;

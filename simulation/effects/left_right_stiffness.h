@@ -14,6 +14,7 @@ class LeftRightStiffness : public Effect {
   std::string meaning() const override { return "left breast stiffer than the right one (case.side = \"both\")"; }
   EffectTraits traits() const override { return {.breast_only = true}; }
   const std::vector<Parameter>& parameters() const override;
+  bool belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model) const override;
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 };

@@ -81,6 +81,23 @@ TEST(Decide, ALocalCauseThatIsNotListedIsUnexplainedBeforeAnythingIsAmbiguous) {
   EXPECT_EQ(decided(list, little).missing, Names{"ligament"}) << "an effect that is sure is named beside it";
 }
 
+TEST(Decide, ALocalCauseThatIsLikelierThanAllEffectsIsUnexplainedWhereNothingIsUnlikely) {
+  const auto with_local = [](double effect, double share) {
+    auto list = hypotheses({{{1}, effect}});
+    for (Hypothesis& h : list)
+      if (h.effects.empty()) h.with_unlisted = {share, 0, 0};
+    return decided(list, little);
+  };
+  const Diagnosis local = with_local(0.2, 0.8);
+  EXPECT_EQ(local.verdict, Verdict::unexplained);
+  EXPECT_EQ(local.missing, Names{"adhesion"});
+  EXPECT_NE(local.why.find("probability 0.64, that nothing is missing 0.16"), std::string::npos) << local.why;
+  const Diagnosis effect = with_local(0.55, 0.8);
+  EXPECT_EQ(effect.verdict, Verdict::ambiguous);
+  EXPECT_NE(effect.why.find("nothing is missing has probability 0.09"), std::string::npos) << effect.why;
+  EXPECT_EQ(with_local(0.1, 0.1).verdict, Verdict::nothing_missing) << "no more than was believed before";
+}
+
 TEST(Decide, WhatWasLeftOutCanSpeakAgainstIt) {
   const Diagnosis d = decided(hypotheses({{{0}, 0.97}}), little, -4);
   EXPECT_EQ(d.verdict, Verdict::ambiguous);

@@ -146,8 +146,9 @@ TEST(Causes, AreDrawnWithinTheCataloguesRanges) {
         EXPECT_LE(value, row->upper) << name << "." << key;
       }
   }
-  // left_right_stiffness needs two breasts, a phantom has one; part_stiffness and support_compliance need an object.
-  EXPECT_EQ(catalogue_causes().size() + 3, simulation::catalogue().size());
+  // left_right_stiffness needs two breasts, a phantom has one; part_stiffness and support_compliance need an object;
+  // local_stiffness stands for causes that no effect lists.
+  EXPECT_EQ(catalogue_causes().size() + 4, simulation::catalogue().size());
   for (const std::string& name : outside_causes()) EXPECT_EQ(simulation::find_effect(name), nullptr) << name;
 }
 

@@ -69,6 +69,28 @@ TEST_F(ModelEdit, StrengthAndPlaceOfAnAddedEffectAreFreeAboutTheirUsualValues) {
   }
 }
 
+TEST_F(ModelEdit, AnAddedEffectBeginsWithWhatWasChosen) {
+  const simulation::Model model = read_model(
+      file(with_effect(read_model_text(file(base)), "ligament", {{"width_mm", "20.5"}, {"arc", "lower"}})));
+  const simulation::EffectSetting& ligament = model.effects[0];
+  EXPECT_EQ(ligament.parameters.at("width_mm").value, 20.5);
+  EXPECT_TRUE(ligament.parameters.at("width_mm").free);
+  EXPECT_EQ(ligament.options.at("arc"), "lower");
+  EXPECT_EQ(ligament.options.at("tie"), "elastic");
+  EXPECT_EQ(ligament.parameters.at("offset_mm").value, 0);
+}
+
+TEST_F(ModelEdit, WhatIsChosenHasToBeANumberOrAnOptionOfTheEffect) {
+  const auto refused = [this](const char* name, const char* value) {
+    return input_error([&] { with_effect(read_model_text(file(base)), "ligament", {{name, value}}); });
+  };
+  expect_words(refused("widht_mm", "20"), {"ligament has no \"widht_mm\"", "width_mm", "arc"});
+  expect_words(refused("width_mm", "200"), {"ligament.width_mm = 200", "from 1 to 60 mm"});
+  expect_words(refused("width_mm", "20 mm"), {"ligament.width_mm = 20 mm", "a number"});
+  expect_words(refused("width_mm", "nan"), {"ligament.width_mm = nan"});
+  expect_words(refused("arc", "upper"), {"ligament.arc = upper", "lower"});
+}
+
 TEST_F(ModelEdit, RemovingKeepsTheCommentOfTheNextTable) {
   const auto path =
       file("[[effect]]\nname = \"ligament\"\nwidth_mm = 10\n\n# about the skin\n[skin]\nthickness_mm = 2\n");
