@@ -118,6 +118,7 @@ void tell(const calibration::MeasuredScene& scene, const JointFit& joint, const 
   found.within_mm = scene.anatomy->foot_radius_mm * std::sqrt(squares);
   for (const simulation::EffectSetting& effect : joint.parameters->model(joint.fit.u).effects)
     if (effect.name == effect_name) found.effect = effect;
+  found.effect.parameters.at("log_ratio").value = found.size;
 }
 
 /// Whether a verdict may hang on it: an effect that would be told, or something local.

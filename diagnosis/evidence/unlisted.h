@@ -47,7 +47,7 @@ struct FollowedCause {
   Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();
   double within_mm = 0;                   ///< 1 sigma of the place, rms over the three directions, times √3
   double size = 0, low = 0, high = 0;     ///< ln of how many times as stiff; 95 %
-  simulation::EffectSetting effect = {};  ///< as an effect of a model, where the fit ended
+  simulation::EffectSetting effect = {};  ///< as an effect of a model, of that size
 };
 
 /// How likely a cause is there that no effect lists, whatever else is.

@@ -113,8 +113,9 @@ std::vector<std::string> calibration_remarks(const FreeParameters& parameters, c
   for (Eigen::Index i = 0; i < parameters.size(); ++i)
     if (parameters.at_bound(result.fit.u, i))
       remarks.push_back(
-          fmt::format("{} ended at an end of its range ({:.4g} {}): the data pull it further, or say nothing about it",
-                      names[static_cast<std::size_t>(i)], parameters.value(i, result.fit.u[i]), parameters.unit(i)));
+          fmt::format("{} ended at an end of its range ({:.4g}{}): the data pull it further, or say nothing about it",
+                      names[static_cast<std::size_t>(i)], parameters.value(i, result.fit.u[i]),
+                      parameters.unit(i) == "1" ? "" : " " + parameters.unit(i)));
   for (const Eigen::Index i :
        result.object ? std::vector<Eigen::Index>{} : calibration::outside_tissue(parameters, result.fit.u)) {
     const std::string& name = names[static_cast<std::size_t>(i)];

@@ -70,8 +70,8 @@ TEST_F(ModelEdit, StrengthAndPlaceOfAnAddedEffectAreFreeAboutTheirUsualValues) {
 }
 
 TEST_F(ModelEdit, AnAddedEffectBeginsWithWhatWasChosen) {
-  const simulation::Model model = read_model(
-      file(with_effect(read_model_text(file(base)), "ligament", {{"width_mm", "20.5"}, {"arc", "lower"}})));
+  const simulation::Model model =
+      read_model(file(with_effect(read_model_text(file(base)), "ligament", {{"width_mm", "20.5"}, {"arc", "lower"}})));
   const simulation::EffectSetting& ligament = model.effects[0];
   EXPECT_EQ(ligament.parameters.at("width_mm").value, 20.5);
   EXPECT_TRUE(ligament.parameters.at("width_mm").free);
