@@ -9,6 +9,7 @@
 #include "common/error.h"
 #include "simulation/mechanics.h"
 #include "simulation/model_fields.h"
+#include "simulation/parameters.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"
 
@@ -173,6 +174,48 @@ INSTANTIATE_TEST_SUITE_P(Effects, CatalogueTest, ::testing::ValuesIn(catalogue()
 TEST(Catalogue, NamesAreUniqueAndFound) {
   for (const Effect* effect : catalogue()) EXPECT_EQ(find_effect(effect->name()), effect);
   EXPECT_EQ(find_effect("ligamnet"), nullptr);
+}
+
+TEST(LocalStiffness, IsLargestInItsMiddleAndActsOnWhatItIsOfAlone) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  const Scene place{scene.mesh, scene.anatomy, layout, "supine"};
+  const Eigen::Vector3d middle(0.2, -0.3, 0.4);
+  const auto with = [&](const char* of) {
+    Model model = testing::soft_model();
+    EffectSetting spot = null_setting(*find_effect("local_stiffness"));
+    spot.parameters.at("log_ratio").value = 1.5;
+    spot.parameters.at("centre_lateral").value = middle.x();
+    spot.parameters.at("centre_head").value = middle.y();
+    spot.parameters.at("height").value = middle.z();
+    spot.options.at("of") = of;
+    model.effects.push_back(spot);
+    return values_of(make_fields(model, place, {0, 1, 0}));
+  };
+  const auto without = values_of(make_fields(testing::soft_model(), place, {0, 1, 0}));
+  const auto tissue = with("tissue"), skin = with("skin");
+  EXPECT_EQ(tissue.skin_modulus, without.skin_modulus);
+  EXPECT_EQ(skin.ln_young, without.ln_young);
+  for (Eigen::Index c = 0; c < scene.mesh.cells.rows(); ++c) {
+    Eigen::Vector3d at = Eigen::Vector3d::Zero();
+    for (int a = 0; a < 4; ++a) {
+      const int n = scene.mesh.cells(c, a);
+      at += Eigen::Vector3d(scene.anatomy.q(n, 0), scene.anatomy.q(n, 1),
+                            scene.anatomy.thickness_mm[n] / scene.anatomy.foot_radius_mm) /
+            4;
+    }
+    const double expected = 1.5 * std::exp(-0.5 * (at - middle).squaredNorm() / (0.3 * 0.3));
+    EXPECT_NEAR(tissue.ln_young[c] - without.ln_young[c], expected, 1e-12);
+  }
+  const Eigen::VectorXd ratio = skin.skin_modulus.cwiseQuotient(without.skin_modulus);
+  EXPECT_GT(ratio.maxCoeff(), 1.2);
+  EXPECT_LE(ratio.maxCoeff(), std::exp(1.5));
+  EXPECT_GE(ratio.minCoeff(), 1);
+}
+
+TEST(LocalStiffness, StandsForCausesThatNoEffectListsAndNoOtherEffectDoes) {
+  for (const Effect* effect : catalogue())
+    EXPECT_EQ(is_stand_in(*effect), effect->name() == "local_stiffness") << effect->name();
 }
 
 TEST(Ligament, ActsOnTheFootAlone) {

@@ -27,6 +27,7 @@ meshing::Anatomy box_anatomy(const meshing::TetMesh& mesh, const Eigen::Vector3d
   Eigen::Matrix<double, 2, 3> reach;
   reach.row(0) = mesh.points.colwise().minCoeff();
   reach.row(1) = mesh.points.colwise().maxCoeff();
+  a.thickness_mm = mesh.points.col(2);
   a.muscle = std::make_shared<meshing::MuscleDistance>(mesh.muscle, reach);
   return a;
 }
