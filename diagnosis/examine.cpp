@@ -47,15 +47,9 @@ void ask_what_was_left_out(const Subject& subject, Findings& found) {
 
 /// Of what would be named: whether a number of it ended at an end of its range, in the likeliest set that holds it.
 void note_range_ends(Findings& found) {
-  const auto names = found.effects();
   for (Inclusion& one : found.included) {
     if (one.probability < found.priors.named_at) break;
-    const Refit* refit = nullptr;
-    for (const Hypothesis& h : found.hypotheses) {
-      std::vector<std::string> set;
-      for (const int effect : h.effects) set.push_back(names[static_cast<std::size_t>(effect)]);
-      if (std::find(set.begin(), set.end(), one.effect) != set.end() && (refit = found.refit_of(set)) != nullptr) break;
-    }
+    const Refit* refit = found.likeliest_with(one.effect);
     if (refit == nullptr) continue;
     for (const FittedParameter& number : refit->parameters)
       if (number.name.starts_with(one.effect + ".") && number.end != RangeEnd::none) one.ends_at = number.name;
@@ -126,9 +120,12 @@ std::vector<ScanPlace> find_places(const Subject& subject, const Findings& found
 
 /// Local causes along lines lose to effects that were followed; the likeliest are followed too.
 void follow_local(const Subject& subject, const ExamineOptions& options, Findings& found) {
-  tell(options, "local causes");
-  const auto followed = follow_local_causes(subject.scene, subject.given, found.base, options.priors, found.hypotheses);
-  if (!followed.empty()) found.unlisted = weigh_unlisted(found.base, options.priors, found.hypotheses, followed);
+  if (found.followed.empty()) {
+    tell(options, "local causes");
+    found.followed = follow_local_causes(subject.scene, subject.given, found.base, options.priors, found.hypotheses);
+  }
+  if (!found.followed.empty())
+    found.unlisted = weigh_unlisted(found.base, options.priors, found.hypotheses, found.followed);
 }
 
 }  // namespace
@@ -166,6 +163,17 @@ const Refit* Findings::refit_of(const std::vector<std::string>& wanted) const {
   const std::set<std::string> set(wanted.begin(), wanted.end());
   for (const Refit& refit : refits)
     if (refit.solved && std::set<std::string>(refit.effects.begin(), refit.effects.end()) == set) return &refit;
+  return nullptr;
+}
+
+const Refit* Findings::likeliest_with(const std::string& effect) const {
+  const auto names = effects();
+  for (const Hypothesis& h : hypotheses) {
+    std::vector<std::string> set;
+    for (const int e : h.effects) set.push_back(names[static_cast<std::size_t>(e)]);
+    if (std::find(set.begin(), set.end(), effect) == set.end()) continue;
+    if (const Refit* refit = refit_of(set)) return refit;
+  }
   return nullptr;
 }
 

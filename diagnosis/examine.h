@@ -64,6 +64,7 @@ struct Findings {
   std::vector<Beside> beside;               ///< each holds those before it
   std::vector<Refit> refits;                ///< of some of them, the likelier first
   std::vector<Inclusion> included;          ///< most probable first
+  std::vector<FollowedCause> followed;      ///< of these some, through the chain
   Unlisted unlisted;                        ///< causes that no effect lists, as rivals
   Unexplained unexplained;                  ///< over all hypotheses
   std::vector<Unexplained> unexplained_by;  ///< of the first hypotheses_told
@@ -87,6 +88,8 @@ struct Findings {
   std::vector<std::string> effects() const;                              ///< of the candidates
   std::vector<std::string> errors_beside() const;                        ///< that errors were last measured beside
   const Refit* refit_of(const std::vector<std::string>& effects) const;  ///< of that set; nullptr where there is none
+  /// The refit of the likeliest set that holds the effect and was followed; nullptr where there is none.
+  const Refit* likeliest_with(const std::string& effect) const;
 };
 
 /// The whole examination: a fit of the base model with all that is never known, the catalogue weighed along straight

@@ -40,7 +40,9 @@ void add_those_of_refit(const Refit& refit, std::vector<MeasurementAtEnd>& list)
 std::vector<MeasurementAtEnd> measurements_at_end(const Findings& found) {
   std::vector<MeasurementAtEnd> list;
   add_those_of_model(found, list);
-  if (found.diagnosis.verdict == Verdict::nothing_missing) return list;
+  constexpr double as_likely_as_not = 0.5;
+  if (found.diagnosis.verdict == Verdict::nothing_missing || found.unlisted.probability >= as_likely_as_not)
+    return list;
   std::vector<std::string> likeliest;
   for (const int effect : found.hypotheses.front().effects)
     likeliest.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);

@@ -16,7 +16,8 @@ struct MeasurementAtEnd {
 };
 
 /// Those of the model itself, and where something is missing those of the likeliest set that was followed through the
-/// chain. Empty: none.
+/// chain; these only where something local that no effect lists is less likely than not, for what has another
+/// explanation is no wrong input. Empty: none.
 std::vector<MeasurementAtEnd> measurements_at_end(const Findings& found);
 
 }  // namespace supine::diagnosis

@@ -70,6 +70,7 @@ void say_unexpected(const Run& run, const Findings& found) {
   if (!words.empty()) run.say("  otherwise than expected, " + joined(words, "; "));
 }
 
+constexpr double worth_naming = 0.01;
 constexpr double worth_telling = 0.2;  // of a local cause: twice what it was before
 
 void say_hypotheses(const Run& run, const Findings& found) {
@@ -145,7 +146,9 @@ void say_verdict(const Run& run, const Findings& found) {
       break;
     case Verdict::unexplained:
       run.say(fmt::format("  unexplained: {}{}", d.why,
-                          d.missing.empty() ? "" : "; best of the catalogue: " + with_probabilities(found)));
+                          d.missing.empty() || found.included_of(d.missing[0]).probability < worth_naming
+                              ? ""
+                              : "; best of the catalogue: " + with_probabilities(found)));
       if (found.forces)
         run.say(
             fmt::format("  hint:     forces on the skin that would explain it reach {:.2f} kPa, {:.2f} by chance; "
