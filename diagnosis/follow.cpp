@@ -18,7 +18,7 @@ namespace {
 
 constexpr double worth_going_on = 0.1;  // the same of what holds more than a likeliest set that was followed
 constexpr double stands_out = 0.05;     // inclusion from which more than two sets are followed
-constexpr double out_of_reach = 10;  // ln odds: what following an effect may gain over lines, by and large
+constexpr double out_of_reach = 10;     // ln odds: what following an effect may gain over lines, by and large
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
 constexpr double cost_of_an_idle_effect = 1;  // ln evidence, by and large
 constexpr std::size_t singles_to_draw_from = 3, most_further = 8, most_where_lines_bend = 6;  // the last: times refits
