@@ -120,12 +120,9 @@ std::vector<ScanPlace> find_places(const Subject& subject, const Findings& found
 
 /// Local causes along lines lose to effects that were followed; the likeliest are followed too.
 void follow_local(const Subject& subject, const ExamineOptions& options, Findings& found) {
-  if (found.followed.empty()) {
-    tell(options, "local causes");
-    found.followed = follow_local_causes(subject.scene, subject.given, found.base, options.priors, found.hypotheses);
-  }
-  if (!found.followed.empty())
-    found.unlisted = weigh_unlisted(found.base, options.priors, found.hypotheses, found.followed);
+  tell(options, "local causes");
+  const auto followed = follow_local_causes(subject.scene, subject.given, found.base, options.priors, found.hypotheses);
+  if (!followed.empty()) found.unlisted = weigh_unlisted(found.base, options.priors, found.hypotheses, followed);
 }
 
 }  // namespace

@@ -64,7 +64,6 @@ struct Findings {
   std::vector<Beside> beside;               ///< each holds those before it
   std::vector<Refit> refits;                ///< of some of them, the likelier first
   std::vector<Inclusion> included;          ///< most probable first
-  std::vector<FollowedCause> followed;      ///< of these some, through the chain
   Unlisted unlisted;                        ///< causes that no effect lists, as rivals
   Unexplained unexplained;                  ///< over all hypotheses
   std::vector<Unexplained> unexplained_by;  ///< of the first hypotheses_told

@@ -9,7 +9,6 @@
 #include "common/error.h"
 #include "diagnosis/beside.h"
 #include "diagnosis/evidence/left_out.h"
-#include "diagnosis/evidence/local_fit.h"
 #include "diagnosis/evidence/strength_profile.h"
 #include "diagnosis/next_set.h"
 
@@ -18,7 +17,6 @@ namespace {
 
 constexpr double worth_going_on = 0.1;  // the same of what holds more than a likeliest set that was followed
 constexpr double stands_out = 0.05;     // inclusion from which more than two sets are followed
-constexpr double out_of_reach = 10;     // ln odds: what following an effect may gain over lines, by and large
 constexpr std::size_t refits_when_quiet = 2, most_simpler = 5;
 constexpr double cost_of_an_idle_effect = 1;  // ln evidence, by and large
 constexpr std::size_t singles_to_draw_from = 3, most_further = 8, most_where_lines_bend = 6;  // the last: times refits
@@ -44,10 +42,6 @@ class Follower {
   void run() {
     if (options_.refits > 0) look_from_usual_sizes();
     if (options_.refits > 0) follow_expected();
-    if (options_.refits > 0 && local_cause_is_sure()) {
-      follow_likeliest(refits_when_quiet);
-      return;
-    }
     explore();
     if (settle_strengths()) {
       explore();
@@ -92,36 +86,17 @@ class Follower {
     normalise(found_.hypotheses);
   }
 
-  /// Whether a local cause, followed through the chain, leaves all effects so far behind that following these brings
-  /// none of them back.
-  bool local_cause_is_sure() {
-    std::vector<Hypothesis> screened = found_.hypotheses;
-    weigh_unlisted(found_.base, found_.priors, screened);
-    if (options_.progress) options_.progress("local causes");
-    found_.followed = follow_local_causes(subject_.scene, subject_.given, found_.base, found_.priors, screened);
-    if (found_.followed.empty()) return false;
-    const Unlisted all = weigh_unlisted(found_.base, found_.priors, screened, found_.followed);
-    double effects = 0;
-    for (const Hypothesis& h : screened)
-      if (!h.effects.empty()) effects += h.probability;
-    return std::log(all.probability) - std::log(effects) > out_of_reach;
-  }
-
-  /// What is screened as likely is followed.
-  void follow_likeliest(std::size_t most) {
-    for (std::size_t simpler = 0; !bent_ && !(first_holds_an_effect() && found_.hypotheses.front().refitted);) {
-      const Hypothesis* next = found_.refits.size() < most ? next_to_refit(found_.hypotheses) : nullptr;
-      if (next == nullptr && simpler < most_simpler) next = simpler_than_first(found_.hypotheses), ++simpler;
-      if (next == nullptr) break;
-      follow_one(next->effects);
-    }
-  }
-
-  /// The same, then what lines from there promise.
+  /// What is screened as likely is followed, then what lines from there promise.
   void explore() {
     auto most = static_cast<std::size_t>(options_.refits);
     if (!something_stands_out(found_)) most = std::min(most, refits_when_quiet);
-    if (most > 0) follow_likeliest(most);
+    for (std::size_t simpler = 0; !bent_ && !(first_holds_an_effect() && found_.hypotheses.front().refitted);) {
+      const Hypothesis* next = found_.refits.size() < most ? next_to_refit(found_.hypotheses) : nullptr;
+      if (next == nullptr && most > 0 && simpler < most_simpler)
+        next = simpler_than_first(found_.hypotheses), ++simpler;
+      if (next == nullptr) break;
+      follow_one(next->effects);
+    }
     if (!bent_ && most > 0) on_from_first();
     if (bent_) one_at_a_time();
   }

@@ -183,8 +183,8 @@ void check_effects_act(const Model& model, const Scene& scene) {
               .c_str());
     if (effect != nullptr && !effect->belongs_to(scene.mesh, scene.anatomy, model))
       refuse(
-          "the body has not what it is about (a breast's anatomy, two breasts, a named part, a named support that does "
-          "not slide); remove the effect");
+          "the body has not what it is about (a breast's anatomy, one breast by itself, two breasts, a named part, a "
+          "named support that does not slide); remove the effect");
     const char* unread = nullptr;
     bool acts = false;
     for (const std::string& column : changed_columns(model, setting, scene)) {

@@ -51,19 +51,14 @@ void set_free(simulation::EffectSetting& setting, const char* parameter, double 
   setting.parameters.at(parameter) = {std::clamp(value, row.lower, row.upper), true, sd, row.lower, row.upper};
 }
 
-/// Where the base fit has its numbers; the cause as @p cause has it.
-VectorXd start_of(const calibration::FreeParameters& parameters, const BaseFit& base,
-                  const std::map<std::string, double>& cause) {
-  VectorXd u = parameters.start();
-  const auto& names = parameters.names();
-  const auto& own = base.parameters->names();
-  for (Index i = 0; i < u.size(); ++i) {
-    const std::string& name = names[static_cast<std::size_t>(i)];
-    const auto found = std::find(own.begin(), own.end(), name);
-    if (found != own.end()) u[i] = base.fit.u[found - own.begin()];
-    if (const auto value = cause.find(name); value != cause.end()) u[i] = parameters.coordinate(i, value->second);
-  }
-  return parameters.clamped(u);
+/// Where the base fit has its numbers; the cause as @p cause has it, by name and in units.
+VectorXd start_of(const JointFit& joint, const BaseFit& base, const std::map<std::string, double>& cause) {
+  VectorXd u = start_at(joint, base);
+  const auto& names = joint.parameters->names();
+  for (Index i = 0; i < u.size(); ++i)
+    if (const auto value = cause.find(names[static_cast<std::size_t>(i)]); value != cause.end())
+      u[i] = joint.parameters->coordinate(i, value->second);
+  return joint.parameters->clamped(u);
 }
 
 /// Evidence of a fit whose strength may be of several sizes, each alike.
@@ -140,7 +135,8 @@ double length_mm(LocalKind kind, const Patchiness& patchiness) {
 }  // namespace
 
 bool can_follow(LocalKind kind, const calibration::MeasuredScene& scene, const simulation::Model& given) {
-  return kind != LocalKind::muscle && !scene.anatomy->is_object() && scene.anatomy->breasts.empty() &&
+  return kind != LocalKind::muscle &&
+         simulation::find_effect(effect_name)->belongs_to(*scene.mesh, *scene.anatomy, given) &&
          std::none_of(given.effects.begin(), given.effects.end(), [](const auto& e) { return e.name == effect_name; });
 }
 
@@ -174,8 +170,8 @@ std::optional<FollowedCause> follow_local_cause(const calibration::MeasuredScene
   for (int i = 0; i < 3; ++i) start[full_name(coordinates[i])] = base.local.anatomy(from.cause, i);
   Hypothesis h;
   try {
-    fit_jointly(scene, base, {start_of(*joint.parameters, base, start), base.nuisances}, &base.fit.prediction.solution,
-                most_steps, joint, h);
+    fit_jointly(scene, base, {start_of(joint, base, start), base.nuisances}, &base.fit.prediction.solution, most_steps,
+                joint, h);
   } catch (const NumericalFailure&) {
     return {};
   }

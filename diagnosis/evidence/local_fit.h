@@ -16,14 +16,15 @@ simulation::EffectSetting free_local_cause(const calibration::MeasuredScene& sce
                                            LocalKind kind, double length_mm);
 
 /// Follows a local cause through the chain, beside nothing else, from where straight lines have its place and size.
-/// @param given  the base model: where its priors stand
+/// @param given      the base model: where its priors stand
+/// @param length_mm  where the prior of its length stands
 /// @return  nothing where there is no equilibrium with it
 std::optional<FollowedCause> follow_local_cause(const calibration::MeasuredScene& scene, const simulation::Model& given,
                                                 const BaseFit& base, const Hypothesis& nothing,
                                                 const LikeliestCause& from, double length_mm);
 
-/// The likeliest of each kind that may decide something, followed: where something is likelier than not to be told, and
-/// straight lines have it no further than e⁻¹² below what is likeliest.
+/// The likeliest of each kind, followed: where an effect or something local has 0.2 or more, and straight lines have it
+/// no further than e⁻¹² below what is likeliest.
 /// @pre  weigh_unlisted() of @p hypotheses
 std::vector<FollowedCause> follow_local_causes(const calibration::MeasuredScene& scene, const simulation::Model& given,
                                                const BaseFit& base, const Priors& priors,

@@ -26,7 +26,8 @@ std::vector<Nuisance> kept(const JointFit& from, const std::vector<std::string>&
   return list;
 }
 
-/// Numbers where the base fit has them, else where the prior has them.
+}  // namespace
+
 Eigen::VectorXd start_at(const JointFit& set, const BaseFit& base) {
   Eigen::VectorXd u = set.parameters->start();
   const auto& names = set.parameters->names();
@@ -37,8 +38,6 @@ Eigen::VectorXd start_at(const JointFit& set, const BaseFit& base) {
   }
   return u;
 }
-
-}  // namespace
 
 simulation::EffectSetting free_setting(const std::string& name) {
   constexpr double least_share = 1e-3;  // of the usual size: where the logarithm of a strength ends

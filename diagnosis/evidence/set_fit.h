@@ -14,6 +14,9 @@ simulation::EffectSetting free_setting(const std::string& effect);
 JointFit unfitted(const simulation::Model& given, const BaseFit& base, const JointFit& from,
                   const std::vector<std::string>& effects);
 
+/// Coordinates to begin with: those of numbers that the base fit has too, else the prior's.
+Eigen::VectorXd start_at(const JointFit& set, const BaseFit& base);
+
 /// Fills the hypothesis of a fit: Laplace's evidence at the optimum.
 void weigh_at(const BaseFit& base, const JointFit& fit, Hypothesis& h);
 

@@ -6,7 +6,6 @@
 #include <limits>
 #include <map>
 #include <numeric>
-#include <tuple>
 
 #include "common/log_sum.h"
 #include "common/statistics.h"
@@ -277,7 +276,7 @@ std::array<LikeliestCause, local_kinds> likeliest_causes(const LocalCauses& caus
     one.cause = likeliest_of(causes, gain, static_cast<LocalKind>(kind));
     if (one.cause < 0) continue;
     one.ln_gain = gain[one.cause], one.ln_of_kind = mean[kind];
-    std::tie(one.size, one.sd) = size_of(more, h, one.cause);
+    one.size = size_of(more, h, one.cause).first;
   }
   return found;
 }

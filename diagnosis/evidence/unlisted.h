@@ -45,7 +45,7 @@ struct FollowedCause {
   LocalKind kind = LocalKind::tissue;
   double ln_gain = 0;  ///< of the evidence with it, at any place and of any size, over that without
   Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();
-  double within_mm = 0;                   ///< 1 sigma of the place, rms over the three directions, times √3
+  double within_mm = 0;                   ///< rms distance of what is likely from there
   double size = 0, low = 0, high = 0;     ///< ln of how many times as stiff; 95 %
   simulation::EffectSetting effect = {};  ///< as an effect of a model, of that size
 };
@@ -76,7 +76,7 @@ struct LikeliestCause {
   Eigen::Index cause = -1;  ///< row of the local causes; -1 where there is none of the kind
   double ln_gain = 0;       ///< over all sizes it may have
   double ln_of_kind = 0;    ///< the mean over the places of the kind
-  double size = 0, sd = 0;  ///< in standard deviations of its field
+  double size = 0;          ///< in standard deviations of its field
 };
 std::array<LikeliestCause, local_kinds> likeliest_causes(const LocalCauses& causes, const Hypothesis& h);
 

@@ -145,6 +145,17 @@ std::size_t byte_of(const std::string& line, std::size_t column) {
 
 }  // namespace
 
+std::map<std::string, std::string> chosen_values(const std::vector<std::string>& words) {
+  std::map<std::string, std::string> values;
+  for (const std::string& word : words) {
+    const auto equals = word.find('=');
+    if (equals == 0 || equals == std::string::npos || equals + 1 == word.size())
+      throw InputError(fmt::format("--with {}: must be NAME=VALUE, such as width_mm=20", word));
+    values[word.substr(0, equals)] = word.substr(equals + 1);
+  }
+  return values;
+}
+
 std::string effect_block(const Effect& effect, const std::map<std::string, std::string>& chosen) {
   check_names(effect, chosen);
   std::string block = fmt::format("[[effect]]  # {}\nname = \"{}\"\n", effect.meaning(), effect.name());

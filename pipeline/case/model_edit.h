@@ -3,11 +3,15 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "pipeline/case/model_file.h"
 #include "simulation/catalogue.h"
 
 namespace supine::pipeline {
+
+/// NAME=VALUE words, by name. @throws InputError  a word without either
+std::map<std::string, std::string> chosen_values(const std::vector<std::string>& words);
 
 /// The [[effect]] block that stands for @p effect in a model.toml: everything free, from the catalogue's median
 /// with the catalogue's spread and bounds; units and meanings as comments.

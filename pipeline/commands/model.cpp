@@ -139,24 +139,13 @@ class ModelTool : public Tool {
     run.say(fmt::format("{} fits a breast {:.0f} mm high", target.string(), height_mm));
   }
 
-  /// What --with names. @throws InputError  no NAME=VALUE
-  std::map<std::string, std::string> chosen() const {
-    std::map<std::string, std::string> values;
-    for (const std::string& one : with_) {
-      const auto equals = one.find('=');
-      if (equals == 0 || equals == std::string::npos || equals + 1 == one.size())
-        throw InputError(fmt::format("--with {}: must be NAME=VALUE, such as width_mm=20", one));
-      values[one.substr(0, equals)] = one.substr(equals + 1);
-    }
-    return values;
-  }
-
   void edit(Run& run) {
     const std::string& effect = arguments_[0];
     const fs::path file = arguments_[1];
     const fs::path target = output.empty() ? file : output;
     const ModelText given = read_model_text(file);
-    const std::string text = action_ == "add" ? with_effect(given, effect, chosen()) : without_effect(given, effect);
+    const std::string text =
+        action_ == "add" ? with_effect(given, effect, chosen_values(with_)) : without_effect(given, effect);
     // Changing the named file is what was asked for, so only another target needs --force.
     Outputs outputs(output.empty() || run.force());
     const fs::path temporary = outputs.stage(target);

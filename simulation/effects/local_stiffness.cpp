@@ -57,6 +57,10 @@ const std::vector<OptionRow>& LocalStiffness::options() const {
   return rows;
 }
 
+bool LocalStiffness::belongs_to(const meshing::TetMesh&, const meshing::Anatomy& anatomy, const Model&) const {
+  return !anatomy.is_object() && anatomy.breasts.empty();
+}
+
 Eigen::Vector3d anatomy_place(const Scene& scene, const Eigen::Ref<const Eigen::RowVectorXi>& nodes) {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
   for (const int n : nodes) {

@@ -16,6 +16,7 @@ class LocalStiffness : public Effect {
   EffectTraits traits() const override { return {.breast_only = true}; }
   const std::vector<Parameter>& parameters() const override;
   const std::vector<OptionRow>& options() const override;
+  bool belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model) const override;
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;
 };

@@ -80,6 +80,13 @@ TEST_F(ModelEdit, AnAddedEffectBeginsWithWhatWasChosen) {
   EXPECT_EQ(ligament.parameters.at("offset_mm").value, 0);
 }
 
+TEST_F(ModelEdit, WhatIsChosenIsANameAndAValue) {
+  EXPECT_EQ(chosen_values({"width_mm=20", "arc=lower"}),
+            (std::map<std::string, std::string>{{"arc", "lower"}, {"width_mm", "20"}}));
+  for (const char* word : {"width_mm", "=20", "width_mm="})
+    expect_words(input_error([word] { chosen_values({word}); }), {word, "NAME=VALUE"});
+}
+
 TEST_F(ModelEdit, WhatIsChosenHasToBeANumberOrAnOptionOfTheEffect) {
   const auto refused = [this](const char* name, const char* value) {
     return input_error([&] { with_effect(read_model_text(file(base)), "ligament", {{name, value}}); });
