@@ -109,6 +109,15 @@ void tell_missing(const Json& diagnosis, const Places& places, Answer& answer) {
                                places.make("calibrate"));
 }
 
+/// Whether the best of the catalogue has any probability at all, where that is told.
+bool may_be_close(const Json& diagnosis, const std::vector<std::string>& missing) {
+  constexpr double worth_naming = 0.01;
+  if (missing.empty()) return false;
+  for (const Json& one : diagnosis.value("included", Json::array()))
+    if (one.value("effect", "") == missing[0]) return number(one, "probability") >= worth_naming;
+  return true;
+}
+
 void tell_diagnosis(const Json& diagnosis, const Places& places, const char* body, Answer& answer) {
   const std::string verdict = diagnosis.value("verdict", "");
   const Json missing = diagnosis.value("missing", Json::array());
@@ -128,7 +137,7 @@ void tell_diagnosis(const Json& diagnosis, const Places& places, const char* bod
   } else {
     answer.kind = "unexplained";
     answer.sentence = fmt::format("The model is off in a way that no effect of the catalogue explains{}.",
-                                  missing.empty() ? "" : "; closest: " + listed(missing, "or"));
+                                  may_be_close(diagnosis, missing) ? "; closest: " + listed(missing, "or") : "");
     answer.next = fmt::format("Look at the map below, check scan and segmentation there, and {}.",
                               next_measurement(diagnosis, body));
   }

@@ -323,6 +323,10 @@ TEST(ReportAnswer, AnAmbiguousSetComesWithTheMeasurementThatSplitsIt) {
 TEST(ReportAnswer, UnexplainedNamesTheClosestAsNoMoreThanThat) {
   expect_words(answered({{"verdict", "unexplained"}, {"missing", {"creep"}}}).sentence,
                {"no effect", "closest: creep"});
+  const Json unlikely = {{"verdict", "unexplained"},
+                         {"missing", {"creep"}},
+                         {"included", {{{"effect", "creep"}, {"probability", 0.001}}}}};
+  EXPECT_EQ(answered(unlikely).sentence.find("closest"), std::string::npos) << "what has no probability is not close";
 }
 
 TEST(ReportAnswer, SaysWhereSomethingLocalIsThatNoEffectLists) {

@@ -83,7 +83,8 @@
   // Sets of effects, most probable first, with what each leaves unexplained.
   const hypotheses = (d) => {
     if (!d.hypotheses) return "";
-    const rows = d.hypotheses.map((h) => ({ ...h, name: h.effects.length ? h.effects.map(words).join(" + ") : "nothing missing",
+    const none = d.unlisted && d.unlisted.probability >= 0.2 ? "nothing that is listed" : "nothing missing";
+    const rows = d.hypotheses.map((h) => ({ ...h, name: h.effects.length ? h.effects.map(words).join(" + ") : none,
       left: `${number(h.unexplained_mm, 1)} [${number(h.unexplained95[0], 1)}, ${number(h.unexplained95[1], 1)}]` }));
     return supine.table_figure("hypotheses", "What may be missing", [{ title: "hypothesis", key: "name" },
       { title: "probability", key: "probability", digits: 2 }, { title: "unexplained, mm [95 %]", key: "left" }], rows,
