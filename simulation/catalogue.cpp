@@ -14,6 +14,7 @@
 #include "simulation/effects/incompressibility.h"
 #include "simulation/effects/left_right_stiffness.h"
 #include "simulation/effects/ligament.h"
+#include "simulation/effects/local_muscle.h"
 #include "simulation/effects/local_stiffness.h"
 #include "simulation/effects/misregistration.h"
 #include "simulation/effects/part_stiffness.h"
@@ -62,6 +63,7 @@ std::vector<const Effect*>& entries() {
   static const Creep creep;
   static const ArmTraction arm_traction;
   static const ChestWallMotion chest_wall_motion;
+  static const LocalMuscle local_muscle;
   static const GravityTilt gravity_tilt;
   static const Misregistration misregistration;
   static const SegmentationOffset segmentation_offset;
@@ -83,6 +85,7 @@ std::vector<const Effect*>& entries() {
                                            &creep,
                                            &arm_traction,
                                            &chest_wall_motion,
+                                           &local_muscle,
                                            &gravity_tilt,
                                            &misregistration,
                                            &segmentation_offset};
@@ -116,7 +119,9 @@ bool is_measurement_effect(const std::string& effect) {
   return kind == EffectKind::measurement || kind == EffectKind::numerical;
 }
 
-bool is_stand_in(const Effect& effect) { return dynamic_cast<const LocalStiffness*>(&effect) != nullptr; }
+bool is_stand_in(const Effect& effect) {
+  return dynamic_cast<const LocalStiffness*>(&effect) != nullptr || dynamic_cast<const LocalMuscle*>(&effect) != nullptr;
+}
 
 const Effect& place_of_scan() {
   return **std::find_if(catalogue().begin(), catalogue().end(),

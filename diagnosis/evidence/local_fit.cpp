@@ -10,6 +10,7 @@
 #include "common/log_sum.h"
 #include "common/statistics.h"
 #include "simulation/catalogue.h"
+#include "simulation/effects/local_muscle.h"
 #include "simulation/effects/local_stiffness.h"
 #include "simulation/parameters.h"
 
@@ -21,16 +22,26 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double strength_sd = 4;      // standard deviations of the field: the middle one of what lines are drawn to
-constexpr double furthest_start = 1;   // of the logarithm: further than that lines do not hold
 constexpr double out_of_reach = 12;    // of the logarithm: what following may gain
 constexpr double worth_asking = 0.2;   // probability of an effect, or of something local, that may be told
 constexpr double worth_following = 1;  // gain along lines, of the logarithm
 constexpr double spread_of_length = 0.35;  // of itself
 constexpr int most_steps = 10;
-const std::string effect_name = simulation::LocalStiffness().name();
-const char* const coordinates[] = {"centre_lateral", "centre_head", "height"};
 
-std::string full_name(const char* parameter) { return effect_name + "." + parameter; }
+/// The effect that a kind is followed as.
+struct StandIn {
+  std::string effect;
+  const char* strength;
+  double furthest_start;  // of the strength: further than that lines do not hold
+  std::vector<const char*> coordinates;
+  std::string full_name(const char* parameter) const { return effect + "." + parameter; }
+};
+
+StandIn stand_in(LocalKind kind) {
+  if (kind == LocalKind::muscle)
+    return {simulation::LocalMuscle().name(), "offset_mm", 10, {"centre_lateral", "centre_head"}};
+  return {simulation::LocalStiffness().name(), "log_ratio", 1, {"centre_lateral", "centre_head", "height"}};
+}
 
 /// Mean and standard deviation of the places of a kind.
 std::pair<Vector3d, Vector3d> spread_of(const LocalCauses& causes, LocalKind kind) {
@@ -47,7 +58,7 @@ std::pair<Vector3d, Vector3d> spread_of(const LocalCauses& causes, LocalKind kin
 
 /// A number free about where it stands, within its own range.
 void set_free(simulation::EffectSetting& setting, const char* parameter, double value, double sd) {
-  const simulation::Parameter& row = *simulation::find_parameter(full_name(parameter));
+  const simulation::Parameter& row = *simulation::find_parameter(setting.name + "." + parameter);
   setting.parameters.at(parameter) = {std::clamp(value, row.lower, row.upper), true, sd, row.lower, row.upper};
 }
 
@@ -62,9 +73,9 @@ VectorXd start_of(const JointFit& joint, const BaseFit& base, const std::map<std
 }
 
 /// Evidence of a fit whose strength may be of several sizes, each alike.
-double over_sizes(const BaseFit& base, const JointFit& joint, const Hypothesis& h) {
+double over_sizes(const BaseFit& base, const JointFit& joint, const StandIn& as, const Hypothesis& h) {
   const auto& names = joint.parameters->names();
-  const Index strength = std::find(names.begin(), names.end(), full_name("log_ratio")) - names.begin();
+  const Index strength = std::find(names.begin(), names.end(), as.full_name(as.strength)) - names.begin();
   VectorXd logs(static_cast<Index>(local_cause_sizes.size()));
   for (std::size_t k = 0; k < local_cause_sizes.size(); ++k) {
     Directions all = h.evidence->directions();
@@ -88,10 +99,11 @@ Vector3d place_mm(const calibration::MeasuredScene& scene, const Vector3d& at) {
 }
 
 /// Size and place where the fit ended.
-void tell(const calibration::MeasuredScene& scene, const JointFit& joint, const Hypothesis& h, FollowedCause& found) {
+void tell(const calibration::MeasuredScene& scene, const JointFit& joint, const StandIn& as, const Hypothesis& h,
+          FollowedCause& found) {
   const auto& names = joint.parameters->names();
   const auto number = [&](const char* parameter) {
-    const Index i = std::find(names.begin(), names.end(), full_name(parameter)) - names.begin();
+    const Index i = std::find(names.begin(), names.end(), as.full_name(parameter)) - names.begin();
     const auto [offset, sd] = h.weighed.number(i);
     const double u = joint.fit.u[i] + offset;
     const auto value = [&](double at) {
@@ -100,20 +112,20 @@ void tell(const calibration::MeasuredScene& scene, const JointFit& joint, const 
     const double reach = normal_reach95() * sd;
     return std::array{value(u), value(u - reach), value(u + reach), std::abs(value(u + sd) - value(u - sd)) / 2};
   };
-  const auto size = number("log_ratio");
+  const auto size = number(as.strength);
   found.size = size[0], found.low = size[1], found.high = size[2];
-  Vector3d at;
+  Vector3d at = Vector3d::Zero();  // the muscle's height over itself is 0
   double squares = 0;
-  for (int i = 0; i < 3; ++i) {
-    const auto one = number(coordinates[i]);
-    at[i] = one[0];
+  for (std::size_t i = 0; i < as.coordinates.size(); ++i) {
+    const auto one = number(as.coordinates[i]);
+    at[static_cast<Index>(i)] = one[0];
     squares += one[3] * one[3];
   }
   found.place_mm = place_mm(scene, at);
   found.within_mm = scene.anatomy->foot_radius_mm * std::sqrt(squares);
   for (const simulation::EffectSetting& effect : joint.parameters->model(joint.fit.u).effects)
-    if (effect.name == effect_name) found.effect = effect;
-  found.effect.parameters.at("log_ratio").value = found.size;
+    if (effect.name == as.effect) found.effect = effect;
+  found.effect.parameters.at(as.strength).value = found.size;
 }
 
 /// Whether a verdict may hang on it: an effect that would be told, or something local.
@@ -129,25 +141,34 @@ bool may_decide(const std::vector<Hypothesis>& hypotheses) {
 }
 
 double length_mm(LocalKind kind, const Patchiness& patchiness) {
-  return kind == LocalKind::tissue ? patchiness.tissue_length_mm : patchiness.skin_length_mm;
+  switch (kind) {
+    case LocalKind::tissue:
+      return patchiness.tissue_length_mm;
+    case LocalKind::skin:
+      return patchiness.skin_length_mm;
+    default:
+      return patchiness.muscle_length_mm;
+  }
 }
 
 }  // namespace
 
 bool can_follow(LocalKind kind, const calibration::MeasuredScene& scene, const simulation::Model& given) {
-  return kind != LocalKind::muscle &&
-         simulation::find_effect(effect_name)->belongs_to(*scene.mesh, *scene.anatomy, given) &&
-         std::none_of(given.effects.begin(), given.effects.end(), [](const auto& e) { return e.name == effect_name; });
+  const StandIn as = stand_in(kind);
+  return simulation::find_effect(as.effect)->belongs_to(*scene.mesh, *scene.anatomy, given) &&
+         std::none_of(given.effects.begin(), given.effects.end(), [&as](const auto& e) { return e.name == as.effect; });
 }
 
 simulation::EffectSetting free_local_cause(const calibration::MeasuredScene& scene, const LocalCauses& causes,
                                            LocalKind kind, double length_mm) {
-  simulation::EffectSetting setting = simulation::null_setting(*simulation::find_effect(effect_name));
-  setting.options.at("of") = local_kind_name(kind);
+  const StandIn as = stand_in(kind);
+  simulation::EffectSetting setting = simulation::null_setting(*simulation::find_effect(as.effect));
+  if (const auto of = setting.options.find("of"); of != setting.options.end()) of->second = local_kind_name(kind);
   const auto of_kind = std::find(causes.kind.begin(), causes.kind.end(), kind) - causes.kind.begin();
-  set_free(setting, "log_ratio", 0, strength_sd * causes.unit[of_kind]);
+  set_free(setting, as.strength, 0, strength_sd * causes.unit[of_kind]);
   const auto [middle, spread] = spread_of(causes, kind);
-  for (int i = 0; i < 3; ++i) set_free(setting, coordinates[i], middle[i], spread[i]);
+  for (std::size_t i = 0; i < as.coordinates.size(); ++i)
+    set_free(setting, as.coordinates[i], middle[static_cast<Index>(i)], spread[static_cast<Index>(i)]);
   const double length = length_mm / scene.anatomy->foot_radius_mm;
   set_free(setting, "length", length, spread_of_length * length);
   return setting;
@@ -158,6 +179,7 @@ std::optional<FollowedCause> follow_local_cause(const calibration::MeasuredScene
                                                 const LikeliestCause& from, double length_mm) {
   FollowedCause found;
   found.kind = base.local.kind[static_cast<std::size_t>(from.cause)];
+  const StandIn as = stand_in(found.kind);
   simulation::Model model = given;
   model.effects.push_back(free_local_cause(scene, base.local, found.kind, length_mm));
   JointFit joint;
@@ -165,9 +187,11 @@ std::optional<FollowedCause> follow_local_cause(const calibration::MeasuredScene
   joint.nuisances = base.nuisances;
   joint.fit.mask = base.fit.mask;
   joint.size_mm = base.size_of(nothing.weighed);
-  const double log_ratio = base.local.unit[from.cause] * from.size;
-  std::map<std::string, double> start{{full_name("log_ratio"), std::clamp(log_ratio, -furthest_start, furthest_start)}};
-  for (int i = 0; i < 3; ++i) start[full_name(coordinates[i])] = base.local.anatomy(from.cause, i);
+  const double size = base.local.unit[from.cause] * from.size;
+  std::map<std::string, double> start{
+      {as.full_name(as.strength), std::clamp(size, -as.furthest_start, as.furthest_start)}};
+  for (std::size_t i = 0; i < as.coordinates.size(); ++i)
+    start[as.full_name(as.coordinates[i])] = base.local.anatomy(from.cause, static_cast<Index>(i));
   Hypothesis h;
   try {
     fit_jointly(scene, base, {start_of(joint, base, start), base.nuisances}, &base.fit.prediction.solution, most_steps,
@@ -175,8 +199,8 @@ std::optional<FollowedCause> follow_local_cause(const calibration::MeasuredScene
   } catch (const NumericalFailure&) {
     return {};
   }
-  found.ln_gain = over_sizes(base, joint, h) - nothing.ln_evidence;
-  tell(scene, joint, h, found);
+  found.ln_gain = over_sizes(base, joint, as, h) - nothing.ln_evidence;
+  tell(scene, joint, as, h, found);
   return found;
 }
 

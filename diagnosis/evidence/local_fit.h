@@ -7,7 +7,8 @@
 
 namespace supine::diagnosis {
 
-/// Whether local causes of a kind can be followed: tissue and skin of one breast, by the effect local_stiffness.
+/// Whether local causes of a kind can be followed: those of one breast whose model does not have one already, tissue and
+/// skin as the effect local_stiffness, muscle as local_muscle.
 bool can_follow(LocalKind kind, const calibration::MeasuredScene& scene, const simulation::Model& given);
 
 /// A local cause of a kind as an effect, all of it free: its strength with 4 standard deviations of its field, its

@@ -25,20 +25,21 @@ constexpr int most_places = 50;  // of each kind
 const auto& sizes = local_cause_sizes;
 constexpr double out_of_sight = 60;  // of the logarithm: no gain lifts a hypothesis from so far below
 
-/// Where the points of the interface lie: those of one face in its middle.
-Points interface_places(const simulation::Mechanics& mechanics) {
-  const simulation::FaceGroup& group = mechanics.layout().interface;
-  const Points faces = middles(mechanics.mesh().points, mechanics.mesh().faces(group.faces, Eigen::all), 3);
-  Points places(group.q.rows(), 3);
-  const Index per_face = faces.rows() > 0 ? places.rows() / faces.rows() : 1;
-  for (Index p = 0; p < places.rows(); ++p) places.row(p) = faces.row(p / per_face);
-  return places;
-}
-
 /// Where the elements of one field lie.
 struct FieldPlaces {
   Points mm, anatomy;
 };
+
+/// Of the points of the interface: those of one face lie in its middle in mm.
+FieldPlaces interface_places(const simulation::Mechanics& mechanics) {
+  const simulation::FaceGroup& group = mechanics.layout().interface;
+  const Points faces = middles(mechanics.mesh().points, mechanics.mesh().faces(group.faces, Eigen::all), 3);
+  FieldPlaces places{Points(group.q.rows(), 3), Points::Zero(group.q.rows(), 3)};
+  const Index per_face = faces.rows() > 0 ? places.mm.rows() / faces.rows() : 1;
+  for (Index p = 0; p < places.mm.rows(); ++p) places.mm.row(p) = faces.row(p / per_face);
+  places.anatomy.leftCols(2) = group.q;
+  return places;
+}
 
 /// Of cells or faces: the middles of their first @p corners nodes.
 FieldPlaces places_of(const simulation::Mechanics& mechanics, const Indices& nodes, int corners) {
@@ -245,7 +246,6 @@ std::string local_kind_name(LocalKind kind) {
 LocalCauses local_causes(const simulation::Mechanics& mechanics, const Patchiness& patchiness, const MatrixXd& shapes) {
   const PatchyFields fields = patchy_fields(mechanics, patchiness);
   const meshing::TetMesh& mesh = mechanics.mesh();
-  const Points muscle = interface_places(mechanics);
   LocalCauses all;
   all.columns.resize(shapes.rows(), 0);
   Index from = 0;
@@ -256,7 +256,7 @@ LocalCauses local_causes(const simulation::Mechanics& mechanics, const Patchines
   add(LocalKind::tissue, fields.tissue, places_of(mechanics, mesh.cells, 4), patchiness.tissue);
   add(LocalKind::skin, fields.skin, places_of(mechanics, mesh.faces(mechanics.layout().skin.faces, Eigen::all), 3),
       patchiness.skin);
-  add(LocalKind::muscle, fields.muscle, {muscle, Points::Zero(muscle.rows(), 3)}, patchiness.muscle_mm);
+  add(LocalKind::muscle, fields.muscle, interface_places(mechanics), patchiness.muscle_mm);
   return all;
 }
 

@@ -32,7 +32,7 @@ struct LocalCauses {
                                 ///< clusters, #clusters by #causes
   std::vector<LocalKind> kind;  ///< of each
   Points place;                 ///< of each, mm, in the imaged shape
-  Points anatomy;               ///< of tissue and skin: lateral, head, height over the muscle, in foot radii
+  Points anatomy;               ///< of each: lateral, head, height over the muscle, in foot radii
   Eigen::VectorXd unit;         ///< the standard deviation: of ln of the stiffness, of the muscle's place mm
 };
 
@@ -46,7 +46,7 @@ struct FollowedCause {
   double ln_gain = 0;  ///< of the evidence with it, at any place and of any size, over that without
   Eigen::Vector3d place_mm = Eigen::Vector3d::Zero();
   double within_mm = 0;                   ///< rms distance of what is likely from there
-  double size = 0, low = 0, high = 0;     ///< ln of how many times as stiff; 95 %
+  double size = 0, low = 0, high = 0;     ///< as those of Unlisted; 95 %
   simulation::EffectSetting effect = {};  ///< as an effect of a model, of that size
 };
 

@@ -110,12 +110,36 @@ void tell_missing(const Json& diagnosis, const Places& places, Answer& answer) {
 }
 
 /// Whether the best of the catalogue has any probability at all, where that is told.
-bool may_be_close(const Json& diagnosis, const std::vector<std::string>& missing) {
+bool may_be_close(const Json& diagnosis, const Json& missing) {
   constexpr double worth_naming = 0.01;
   if (missing.empty()) return false;
   for (const Json& one : diagnosis.value("included", Json::array()))
-    if (one.value("effect", "") == missing[0]) return number(one, "probability") >= worth_naming;
+    if (one.value("effect", "") == missing[0].get<std::string>()) return number(one, "probability") >= worth_naming;
   return true;
+}
+
+/// "supine-model add local_muscle … --with offset_mm=-4.1": a local cause that was followed, as a command; else empty.
+std::string add_local_cause(const Json& diagnosis, const Places& places) {
+  const Json effect = diagnosis.value("unlisted", Json::object()).value("effect", Json());
+  if (!effect.is_object()) return "";
+  std::string numbers;
+  for (const auto& [name, value] : effect.items())
+    if (name != "name")
+      numbers += fmt::format(" --with {}={}", name,
+                             value.is_number() ? fmt::format("{:.3g}", value.get<double>()) : value.get<std::string>());
+  return fmt::format("build/bin/supine-model add {} {}/model.toml{} && {}", effect.value("name", "?"),
+                     places.case_name, numbers, places.make("calibrate"));
+}
+
+void tell_unexplained(const Json& diagnosis, const Places& places, const char* body, Answer& answer) {
+  const Json missing = diagnosis.value("missing", Json::array());
+  answer.kind = "unexplained";
+  answer.sentence = fmt::format("The model is off in a way that no effect of the catalogue explains{}.",
+                                may_be_close(diagnosis, missing) ? "; closest: " + listed(missing, "or") : "");
+  answer.next =
+      fmt::format("Look at the map below, check scan and segmentation there, and {}.", next_measurement(diagnosis, body));
+  answer.command = add_local_cause(diagnosis, places);
+  if (!answer.command.empty()) answer.next += " Or put the local cause into the model and see what it leaves.";
 }
 
 void tell_diagnosis(const Json& diagnosis, const Places& places, const char* body, Answer& answer) {
@@ -135,11 +159,7 @@ void tell_diagnosis(const Json& diagnosis, const Places& places, const char* bod
                : fmt::format("Something is missing, and this scan cannot tell which: {}.", listed(missing, "or"));
     answer.next = fmt::format("To tell them apart, {}.", next_measurement(diagnosis, body));
   } else {
-    answer.kind = "unexplained";
-    answer.sentence = fmt::format("The model is off in a way that no effect of the catalogue explains{}.",
-                                  may_be_close(diagnosis, missing) ? "; closest: " + listed(missing, "or") : "");
-    answer.next = fmt::format("Look at the map below, check scan and segmentation there, and {}.",
-                              next_measurement(diagnosis, body));
+    tell_unexplained(diagnosis, places, body, answer);
   }
 }
 

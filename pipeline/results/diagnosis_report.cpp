@@ -122,6 +122,7 @@ Json unlisted_json(const diagnosis::Unlisted& found) {
   const auto value = [moved](double size) { return moved ? size : std::exp(size); };
   Json effect;
   if (found.effect) {
+    effect["name"] = found.effect->name;
     for (const auto& [name, number] : found.effect->parameters) effect[name] = number.value;
     for (const auto& [name, option] : found.effect->options) effect[name] = option;
   }

@@ -147,8 +147,8 @@ TEST(Causes, AreDrawnWithinTheCataloguesRanges) {
       }
   }
   // left_right_stiffness needs two breasts, a phantom has one; part_stiffness and support_compliance need an object;
-  // local_stiffness stands for causes that no effect lists.
-  EXPECT_EQ(catalogue_causes().size() + 4, simulation::catalogue().size());
+  // local_stiffness and local_muscle stand for causes that no effect lists.
+  EXPECT_EQ(catalogue_causes().size() + 5, simulation::catalogue().size());
   for (const std::string& name : outside_causes()) EXPECT_EQ(simulation::find_effect(name), nullptr) << name;
 }
 

@@ -212,16 +212,42 @@ TEST(LocalStiffness, IsLargestInItsMiddleAndActsOnWhatItIsOfAlone) {
   EXPECT_GT((skin.skin_modulus - without.skin_modulus).maxCoeff(), 0.1 * without.skin_modulus.minCoeff());
 }
 
-TEST(LocalStiffness, IsOfOneBreastByItself) {
-  const testing::TestScene &one = testing::dome_scene(), &two = testing::two_breasts_scene();
-  const Effect& effect = *find_effect("local_stiffness");
-  EXPECT_TRUE(effect.belongs_to(one.mesh, one.anatomy, testing::soft_model()));
-  EXPECT_FALSE(effect.belongs_to(two.mesh, two.anatomy, testing::soft_model()));
+TEST(LocalMuscle, IsFurthestOutInItsMiddleInEveryPoseButTheImagedOne) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  const Eigen::Vector2d middle(0.7, -0.2);
+  Model model = testing::soft_model();
+  EffectSetting hill = null_setting(*find_effect("local_muscle"));
+  hill.parameters.at("offset_mm").value = -6;
+  hill.parameters.at("centre_lateral").value = middle.x();
+  hill.parameters.at("centre_head").value = middle.y();
+  model.effects.push_back(hill);
+  const auto offset = [&](const char* pose) {
+    return values_of(make_fields(model, {scene.mesh, scene.anatomy, layout, pose}, {0, 1, 0})).muscle_offset;
+  };
+  EXPECT_EQ(offset("prone").cwiseAbs().maxCoeff(), 0);
+  const auto supine = offset("supine");
+  double most = 0;
+  for (Eigen::Index p = 0; p < layout.interface.q.rows(); ++p) {
+    const double squares = (layout.interface.q.row(p).transpose() - middle).squaredNorm();
+    EXPECT_NEAR(supine[p], -6 * std::exp(-0.5 * squares / (0.4 * 0.4)), 1e-12);
+    most = std::max(most, -supine[p]);
+  }
+  EXPECT_GT(most, 5.5);
 }
 
-TEST(LocalStiffness, StandsForCausesThatNoEffectListsAndNoOtherEffectDoes) {
+TEST(StandIns, AreOfOneBreastByItself) {
+  const testing::TestScene &one = testing::dome_scene(), &two = testing::two_breasts_scene();
+  for (const char* name : {"local_stiffness", "local_muscle"}) {
+    const Effect& effect = *find_effect(name);
+    EXPECT_TRUE(effect.belongs_to(one.mesh, one.anatomy, testing::soft_model())) << name;
+    EXPECT_FALSE(effect.belongs_to(two.mesh, two.anatomy, testing::soft_model())) << name;
+  }
+}
+
+TEST(StandIns, StandForCausesThatNoEffectListsAndNoOtherEffectsDo) {
   for (const Effect* effect : catalogue())
-    EXPECT_EQ(is_stand_in(*effect), effect->name() == "local_stiffness") << effect->name();
+    EXPECT_EQ(is_stand_in(*effect), effect->name().starts_with("local_")) << effect->name();
 }
 
 TEST(Ligament, ActsOnTheFootAlone) {

@@ -19,6 +19,7 @@ namespace {
 using supine::testing::Twin;
 
 constexpr double log_ratio = 2, lateral = 0.35, head = 0.1, height = 0.5;
+constexpr double low_mm = -6, low_lateral = 0.55;
 
 simulation::Model with_spot(const char* of) {
   simulation::Model model = supine::testing::twin_truth();
@@ -29,6 +30,17 @@ simulation::Model with_spot(const char* of) {
   spot.parameters.at("height").value = height;
   spot.options.at("of") = of;
   model.effects.push_back(spot);
+  return model;
+}
+
+/// A support that has given way where the hill of chest_wall_motion cannot stand.
+simulation::Model with_low_muscle() {
+  simulation::Model model = supine::testing::twin_truth();
+  simulation::EffectSetting hill = simulation::null_setting(*simulation::find_effect("local_muscle"));
+  hill.parameters.at("offset_mm").value = low_mm;
+  hill.parameters.at("centre_lateral").value = low_lateral;
+  hill.parameters.at("length").value = 0.3;
+  model.effects.push_back(hill);
   return model;
 }
 
@@ -71,6 +83,28 @@ TEST(LocalFit, FindsAStiffSpotOfTissueWhereItIs) {
   EXPECT_EQ(found.place_mm, tissue->place_mm);
 }
 
+TEST(LocalFit, FindsAMuscleThatHasGivenWayWhereItIs) {
+  Fitted fitted(with_low_muscle());
+  weigh_unlisted(*fitted.base, fitted.priors, fitted.hypotheses);
+  const auto followed =
+      follow_local_causes(fitted.twin.scene(), fitted.given, *fitted.base, fitted.priors, fitted.hypotheses);
+  const auto muscle = std::find_if(followed.begin(), followed.end(),
+                                   [](const FollowedCause& one) { return one.kind == LocalKind::muscle; });
+  ASSERT_NE(muscle, followed.end());
+  EXPECT_LT(muscle->low, low_mm);
+  EXPECT_GT(muscle->high, low_mm);
+  EXPECT_LT(muscle->high, 0);
+  const meshing::Anatomy& anatomy = fitted.twin.anatomy;
+  const Eigen::Vector3d truth = anatomy.foot_centre_mm + anatomy.foot_radius_mm * low_lateral * anatomy.lateral;
+  EXPECT_LT((muscle->place_mm - truth).norm(), 3 * muscle->within_mm);
+  EXPECT_EQ(muscle->effect.name, "local_muscle");
+  EXPECT_EQ(muscle->effect.parameters.at("offset_mm").value, muscle->size);
+  const Unlisted found = weigh_unlisted(*fitted.base, fitted.priors, fitted.hypotheses, followed);
+  EXPECT_GT(found.probability, 0.5);
+  EXPECT_EQ(found.kind, LocalKind::muscle);
+  EXPECT_TRUE(found.effect.has_value());
+}
+
 TEST(LocalFit, IsNotAskedWhereNothingMayBeTold) {
   Fitted fitted(supine::testing::twin_truth());
   EXPECT_LT(weigh_unlisted(*fitted.base, fitted.priors, fitted.hypotheses).probability, 0.2);
@@ -78,17 +112,20 @@ TEST(LocalFit, IsNotAskedWhereNothingMayBeTold) {
       follow_local_causes(fitted.twin.scene(), fitted.given, *fitted.base, fitted.priors, fitted.hypotheses).empty());
 }
 
-TEST(LocalFit, StartsWithThePlacesOfItsKindAndCannotFollowMuscle) {
+TEST(LocalFit, StartsWithThePlacesOfItsKind) {
   const Fitted fitted(supine::testing::twin_truth());
-  for (const LocalKind kind : {LocalKind::tissue, LocalKind::skin}) {
+  for (const LocalKind kind : {LocalKind::tissue, LocalKind::skin, LocalKind::muscle}) {
     EXPECT_TRUE(can_follow(kind, fitted.twin.scene(), fitted.given));
     const simulation::EffectSetting setting = free_local_cause(fitted.twin.scene(), fitted.base->local, kind, 20);
-    EXPECT_EQ(setting.options.at("of"), local_kind_name(kind));
+    if (kind != LocalKind::muscle) {
+      EXPECT_EQ(setting.options.at("of"), local_kind_name(kind));
+    }
     for (const auto& [name, number] : setting.parameters) EXPECT_TRUE(number.free) << name;
     EXPECT_NEAR(setting.parameters.at("length").value, 20 / fitted.twin.anatomy.foot_radius_mm, 1e-12);
     EXPECT_LT(std::abs(setting.parameters.at("centre_lateral").value), 0.3);
   }
-  EXPECT_FALSE(can_follow(LocalKind::muscle, fitted.twin.scene(), fitted.given));
+  EXPECT_FALSE(can_follow(LocalKind::muscle, fitted.twin.scene(), with_low_muscle()));
+  EXPECT_TRUE(can_follow(LocalKind::muscle, fitted.twin.scene(), with_spot("skin")));
   EXPECT_FALSE(can_follow(LocalKind::tissue, fitted.twin.scene(), with_spot("skin")));
 }
 

@@ -342,6 +342,13 @@ TEST(ReportAnswer, SaysWhereSomethingLocalIsThatNoEffectLists) {
   };
   expect_words(facts(),
                {"no effect lists has probability 0.98", "tissue about (12, -40, 33) mm is 3.9 times as stiff"});
+  const auto answer = [&unlisted] { return answered({{"verdict", "unexplained"}, {"unlisted", unlisted}}); };
+  EXPECT_EQ(answer().command, "") << "it was not followed through the chain";
+  unlisted["effect"] = {{"name", "local_stiffness"}, {"log_ratio", 1.3612}, {"of", "tissue"}};
+  EXPECT_EQ(answer().command,
+            "build/bin/supine-model add local_stiffness mycase/model.toml --with log_ratio=1.36 --with of=tissue && "
+            "make CASE=mycase calibrate");
+  expect_words(answer().next, {"put the local cause into the model"});
   unlisted["probability"] = 0.1;
   EXPECT_EQ(facts().find("no effect lists"), std::string::npos) << "as likely as it was before";
 }

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "simulation/effects/local_muscle.h"
+
+#include "meshing/anatomy.h"
+#include "simulation/fields.h"
+
+namespace supine::simulation {
+
+const std::vector<Parameter>& LocalMuscle::parameters() const {
+  static const std::vector<Parameter> rows = {{.name = "offset_mm",
+                                               .unit = "mm",
+                                               .lower = -15,
+                                               .upper = 15,
+                                               .median = 0,
+                                               .spread = 5,
+                                               .meaning = "how far the muscle has come out in the middle"},
+                                              {.name = "centre_lateral",
+                                               .unit = "1",
+                                               .lower = -1.5,
+                                               .upper = 1.5,
+                                               .median = 0,
+                                               .spread = 0.4,
+                                               .meaning = "the middle from the foot's, in foot radii",
+                                               .shape = true},
+                                              {.name = "centre_head",
+                                               .unit = "1",
+                                               .lower = -1.5,
+                                               .upper = 1.5,
+                                               .median = 0,
+                                               .spread = 0.4,
+                                               .meaning = "the same toward the head",
+                                               .shape = true},
+                                              {.name = "length",
+                                               .unit = "1",
+                                               .null = 0.4,
+                                               .lower = 0.1,
+                                               .upper = 1,
+                                               .median = 0.4,
+                                               .spread = 0.15,
+                                               .meaning = "distance at which 61 % of it are left, in foot radii",
+                                               .shape = true}};
+  return rows;
+}
+
+bool LocalMuscle::belongs_to(const meshing::TetMesh&, const meshing::Anatomy& anatomy, const Model&) const {
+  return !anatomy.is_object() && anatomy.breasts.empty();
+}
+
+void LocalMuscle::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,
+                        Fields<Dual>& fields) const {
+  if (scene.is_imaged() || scene.anatomy.is_object()) return;
+  const Dual &offset_mm = values[0], &centre_lateral = values[1], &centre_head = values[2], &length = values[3];
+  const Table& q = scene.layout.interface.q;
+  for (Eigen::Index p = 0; p < q.rows(); ++p) {
+    const Dual lateral = q(p, 0) - centre_lateral, head = q(p, 1) - centre_head;
+    fields.muscle_offset[p] += offset_mm * ceres::exp(-0.5 * (lateral * lateral + head * head) / (length * length));
+  }
+}
+
+}  // namespace supine::simulation
