@@ -29,7 +29,7 @@ constexpr double spread_of_length = 0.35;  // of itself
 constexpr int most_steps = 10;
 
 /// The effect that a kind is followed as.
-struct StandIn {
+struct FollowedAs {
   std::string effect;
   const char* strength;
   double furthest_start;  // of the strength: further than that lines do not hold
@@ -37,7 +37,7 @@ struct StandIn {
   std::string full_name(const char* parameter) const { return effect + "." + parameter; }
 };
 
-StandIn stand_in(LocalKind kind) {
+FollowedAs followed_as(LocalKind kind) {
   if (kind == LocalKind::muscle)
     return {simulation::LocalMuscle().name(), "offset_mm", 10, {"centre_lateral", "centre_head"}};
   return {simulation::LocalStiffness().name(), "log_ratio", 1, {"centre_lateral", "centre_head", "height"}};
@@ -73,7 +73,7 @@ VectorXd start_of(const JointFit& joint, const BaseFit& base, const std::map<std
 }
 
 /// Evidence of a fit whose strength may be of several sizes, each alike.
-double over_sizes(const BaseFit& base, const JointFit& joint, const StandIn& as, const Hypothesis& h) {
+double over_sizes(const BaseFit& base, const JointFit& joint, const FollowedAs& as, const Hypothesis& h) {
   const auto& names = joint.parameters->names();
   const Index strength = std::find(names.begin(), names.end(), as.full_name(as.strength)) - names.begin();
   VectorXd logs(static_cast<Index>(local_cause_sizes.size()));
@@ -99,7 +99,7 @@ Vector3d place_mm(const calibration::MeasuredScene& scene, const Vector3d& at) {
 }
 
 /// Size and place where the fit ended.
-void tell(const calibration::MeasuredScene& scene, const JointFit& joint, const StandIn& as, const Hypothesis& h,
+void tell(const calibration::MeasuredScene& scene, const JointFit& joint, const FollowedAs& as, const Hypothesis& h,
           FollowedCause& found) {
   const auto& names = joint.parameters->names();
   const auto number = [&](const char* parameter) {
@@ -154,14 +154,14 @@ double length_mm(LocalKind kind, const Patchiness& patchiness) {
 }  // namespace
 
 bool can_follow(LocalKind kind, const calibration::MeasuredScene& scene, const simulation::Model& given) {
-  const StandIn as = stand_in(kind);
+  const FollowedAs as = followed_as(kind);
   return simulation::find_effect(as.effect)->belongs_to(*scene.mesh, *scene.anatomy, given) &&
          std::none_of(given.effects.begin(), given.effects.end(), [&as](const auto& e) { return e.name == as.effect; });
 }
 
 simulation::EffectSetting free_local_cause(const calibration::MeasuredScene& scene, const LocalCauses& causes,
                                            LocalKind kind, double length_mm) {
-  const StandIn as = stand_in(kind);
+  const FollowedAs as = followed_as(kind);
   simulation::EffectSetting setting = simulation::null_setting(*simulation::find_effect(as.effect));
   if (const auto of = setting.options.find("of"); of != setting.options.end()) of->second = local_kind_name(kind);
   const auto of_kind = std::find(causes.kind.begin(), causes.kind.end(), kind) - causes.kind.begin();
@@ -179,7 +179,7 @@ std::optional<FollowedCause> follow_local_cause(const calibration::MeasuredScene
                                                 const LikeliestCause& from, double length_mm) {
   FollowedCause found;
   found.kind = base.local.kind[static_cast<std::size_t>(from.cause)];
-  const StandIn as = stand_in(found.kind);
+  const FollowedAs as = followed_as(found.kind);
   simulation::Model model = given;
   model.effects.push_back(free_local_cause(scene, base.local, found.kind, length_mm));
   JointFit joint;
