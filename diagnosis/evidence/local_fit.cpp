@@ -25,6 +25,7 @@ constexpr double strength_sd = 4;      // standard deviations of the field: the 
 constexpr double out_of_reach = 12;    // of the logarithm: what following may gain
 constexpr double worth_asking = 0.2;   // probability of an effect, or of something local, that may be told
 constexpr double worth_following = 1;  // gain along lines, of the logarithm
+constexpr double likely_beside = 0.5;  // probability of one beside the likeliest effects: may it do without them?
 constexpr double spread_of_length = 0.35;  // of itself
 constexpr int most_steps = 10;
 
@@ -140,6 +141,17 @@ bool may_decide(const std::vector<Hypothesis>& hypotheses) {
          std::any_of(included.begin(), included.end(), [](const auto& one) { return one.second >= worth_asking; });
 }
 
+/// The likeliest of what following from several starts leads to.
+template <class Follow>
+std::optional<FollowedCause> best_from(const std::vector<LikeliestCause>& starts, Follow follow) {
+  std::optional<FollowedCause> best;
+  for (const LikeliestCause& start : starts) {
+    std::optional<FollowedCause> found = follow(start);
+    if (found && (!best || found->ln_gain > best->ln_gain)) best = std::move(found);
+  }
+  return best;
+}
+
 double length_mm(LocalKind kind, const Patchiness& patchiness) {
   switch (kind) {
     case LocalKind::tissue:
@@ -213,16 +225,22 @@ std::vector<FollowedCause> follow_local_causes(const calibration::MeasuredScene&
   for (const Hypothesis& h : hypotheses) most = std::max(most, ln_weight(h));
   const Hypothesis& nothing =
       *std::find_if(hypotheses.begin(), hypotheses.end(), [](const Hypothesis& h) { return h.effects.empty(); });
-  const auto likeliest = likeliest_causes(base.local, nothing);
+  const Hypothesis& first = hypotheses.front();
+  const auto alone = likeliest_causes(base.local, nothing), beside_first = likeliest_causes(base.local, first);
   const double without =
       nothing.ln_prior + nothing.ln_evidence + (nothing.ground != nullptr ? nothing.ground->ln_weight : 0);
   for (std::size_t k = 0; k < local_kinds; ++k) {
-    const LikeliestCause& one = likeliest[k];
     const auto kind = static_cast<LocalKind>(k);
-    const double with = without + std::log(priors.unlisted / static_cast<double>(local_kinds)) + one.ln_of_kind;
-    if (one.cause < 0 || one.ln_gain < worth_following || with < most - out_of_reach || !can_follow(kind, scene, given))
-      continue;
-    if (auto found = follow_local_cause(scene, given, base, nothing, one, length_mm(kind, priors.patchiness)))
+    if (!can_follow(kind, scene, given)) continue;
+    const double with = without + std::log(priors.unlisted / static_cast<double>(local_kinds)) + alone[k].ln_of_kind;
+    std::vector<LikeliestCause> starts;
+    if (alone[k].cause >= 0 && alone[k].ln_gain >= worth_following && with >= most - out_of_reach)
+      starts.push_back(alone[k]);
+    if (!first.effects.empty() && first.with_unlisted[k] >= likely_beside && beside_first[k].cause >= 0)
+      starts.push_back(beside_first[k]);
+    if (auto found = best_from(starts, [&](const LikeliestCause& start) {
+          return follow_local_cause(scene, given, base, nothing, start, length_mm(kind, priors.patchiness));
+        }))
       all.push_back(std::move(*found));
   }
   return all;

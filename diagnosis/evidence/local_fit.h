@@ -24,8 +24,9 @@ std::optional<FollowedCause> follow_local_cause(const calibration::MeasuredScene
                                                 const BaseFit& base, const Hypothesis& nothing,
                                                 const LikeliestCause& from, double length_mm);
 
-/// The likeliest of each kind, followed: where an effect or something local has 0.2 or more, and straight lines have it
-/// no further than e⁻¹² below what is likeliest.
+/// The likeliest of each kind, followed beside nothing: where an effect or something local has 0.2 or more, and straight
+/// lines have it no further than e⁻¹² below what is likeliest; from where it is likely beside the likeliest effects too,
+/// since it may do without them.
 /// @pre  weigh_unlisted() of @p hypotheses
 std::vector<FollowedCause> follow_local_causes(const calibration::MeasuredScene& scene, const simulation::Model& given,
                                                const BaseFit& base, const Priors& priors,

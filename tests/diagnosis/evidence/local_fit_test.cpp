@@ -105,6 +105,26 @@ TEST(LocalFit, FindsAMuscleThatHasGivenWayWhereItIs) {
   EXPECT_TRUE(found.effect.has_value());
 }
 
+TEST(LocalFit, IsAskedHoweverUnlikelyNothingIsWhereItIsLikelyBesideEffects) {
+  Fitted fitted(with_low_muscle());
+  weigh_unlisted(*fitted.base, fitted.priors, fitted.hypotheses);
+  Hypothesis effects = fitted.hypotheses.front();
+  effects.effects = {0};
+  effects.ln_evidence += 100;
+  effects.with_unlisted = {};
+  fitted.hypotheses.insert(fitted.hypotheses.begin(), effects);
+  normalise(fitted.hypotheses);
+  const auto followed = [&fitted] {
+    return follow_local_causes(fitted.twin.scene(), fitted.given, *fitted.base, fitted.priors, fitted.hypotheses);
+  };
+  EXPECT_TRUE(followed().empty()) << "effects alone explain all";
+  fitted.hypotheses.front().with_unlisted[static_cast<std::size_t>(LocalKind::muscle)] = 0.9;
+  const auto causes = followed();
+  ASSERT_EQ(causes.size(), 1u);
+  EXPECT_EQ(causes[0].kind, LocalKind::muscle);
+  EXPECT_LT(causes[0].high, 0);
+}
+
 TEST(LocalFit, IsNotAskedWhereNothingMayBeTold) {
   Fitted fitted(supine::testing::twin_truth());
   EXPECT_LT(weigh_unlisted(*fitted.base, fitted.priors, fitted.hypotheses).probability, 0.2);
