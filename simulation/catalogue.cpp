@@ -120,7 +120,8 @@ bool is_measurement_effect(const std::string& effect) {
 }
 
 bool is_stand_in(const Effect& effect) {
-  return dynamic_cast<const LocalStiffness*>(&effect) != nullptr || dynamic_cast<const LocalMuscle*>(&effect) != nullptr;
+  return dynamic_cast<const LocalStiffness*>(&effect) != nullptr ||
+         dynamic_cast<const LocalMuscle*>(&effect) != nullptr;
 }
 
 const Effect& place_of_scan() {

@@ -28,8 +28,8 @@ EffectTraits traits_of(const std::string& effect);
 /// Whether it is a measurement or a numerical cause, and so none of the body.
 bool is_measurement_effect(const std::string& effect);
 
-/// Whether an effect stands for anything at some place (local_stiffness, local_muscle): the diagnosis weighs it as what no effect
-/// lists, never by its name.
+/// Whether an effect stands for anything at some place (local_stiffness, local_muscle): the diagnosis weighs it as what
+/// no effect lists, never by its name.
 bool is_stand_in(const Effect& effect);
 
 /// The effect that says where a scan lies: the catalogue's first that moves it.

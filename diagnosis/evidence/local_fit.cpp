@@ -129,6 +129,14 @@ void tell(const calibration::MeasuredScene& scene, const JointFit& joint, const 
   found.effect.parameters.at(as.strength).value = found.size;
 }
 
+/// Whether an effect of the catalogue is the same.
+bool is_listed(const FollowedCause& found) {
+  if (found.kind != LocalKind::muscle) return false;
+  const auto& numbers = found.effect.parameters;
+  return simulation::LocalMuscle::is_listed({numbers.at("centre_lateral").value, numbers.at("centre_head").value},
+                                            numbers.at("length").value);
+}
+
 /// Whether a verdict may hang on it: an effect that would be told, or something local.
 bool may_decide(const std::vector<Hypothesis>& hypotheses) {
   std::map<int, double> included;
@@ -213,6 +221,7 @@ std::optional<FollowedCause> follow_local_cause(const calibration::MeasuredScene
   }
   found.ln_gain = over_sizes(base, joint, as, h) - nothing.ln_evidence;
   tell(scene, joint, as, h, found);
+  if (is_listed(found)) return {};
   return found;
 }
 

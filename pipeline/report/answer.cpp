@@ -127,8 +127,8 @@ std::string add_local_cause(const Json& diagnosis, const Places& places) {
     if (name != "name")
       numbers += fmt::format(" --with {}={}", name,
                              value.is_number() ? fmt::format("{:.3g}", value.get<double>()) : value.get<std::string>());
-  return fmt::format("build/bin/supine-model add {} {}/model.toml{} && {}", effect.value("name", "?"),
-                     places.case_name, numbers, places.make("calibrate"));
+  return fmt::format("build/bin/supine-model add {} {}/model.toml{} && {}", effect.value("name", "?"), places.case_name,
+                     numbers, places.make("calibrate"));
 }
 
 void tell_unexplained(const Json& diagnosis, const Places& places, const char* body, Answer& answer) {
@@ -136,8 +136,8 @@ void tell_unexplained(const Json& diagnosis, const Places& places, const char* b
   answer.kind = "unexplained";
   answer.sentence = fmt::format("The model is off in a way that no effect of the catalogue explains{}.",
                                 may_be_close(diagnosis, missing) ? "; closest: " + listed(missing, "or") : "");
-  answer.next =
-      fmt::format("Look at the map below, check scan and segmentation there, and {}.", next_measurement(diagnosis, body));
+  answer.next = fmt::format("Look at the map below, check scan and segmentation there, and {}.",
+                            next_measurement(diagnosis, body));
   answer.command = add_local_cause(diagnosis, places);
   if (!answer.command.empty()) answer.next += " Or put the local cause into the model and see what it leaves.";
 }

@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/effects/local_muscle.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "meshing/anatomy.h"
+#include "simulation/effects/chest_wall_motion.h"
 #include "simulation/fields.h"
 
 namespace supine::simulation {
@@ -44,6 +49,18 @@ const std::vector<Parameter>& LocalMuscle::parameters() const {
 
 bool LocalMuscle::belongs_to(const meshing::TetMesh&, const meshing::Anatomy& anatomy, const Model&) const {
   return !anatomy.is_object() && anatomy.breasts.empty();
+}
+
+bool LocalMuscle::is_listed(const Eigen::Vector2d& centre, double length) {
+  const auto& rows = ChestWallMotion().parameters();
+  const auto can_be = [&rows](const std::string& name, double value) {
+    const auto row = std::find_if(rows.begin(), rows.end(), [&name](const Parameter& p) { return p.name == name; });
+    return value >= row->lower && value <= row->upper;
+  };
+  const double half_width = length * std::sqrt(2 * std::numbers::ln2);
+  const double half_width_of_bump = std::sqrt(1 - std::cbrt(0.5));  // (1 - r²)³ = ½
+  return can_be("centre_lateral", centre.x()) && can_be("centre_head", centre.y()) &&
+         can_be("radius", half_width / half_width_of_bump);
 }
 
 void LocalMuscle::apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>&,

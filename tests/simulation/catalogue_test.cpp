@@ -7,6 +7,7 @@
 #include <set>
 
 #include "common/error.h"
+#include "simulation/effects/local_muscle.h"
 #include "simulation/mechanics.h"
 #include "simulation/model_fields.h"
 #include "simulation/parameters.h"
@@ -234,6 +235,15 @@ TEST(LocalMuscle, IsFurthestOutInItsMiddleInEveryPoseButTheImagedOne) {
     most = std::max(most, -supine[p]);
   }
   EXPECT_GT(most, 5.5);
+}
+
+TEST(LocalMuscle, IsListedWhereTheHillOfTheChestWallCanStandAsWideAsThatCanBe) {
+  // (1 - r²)³ of radius 1 is as wide at half of its height as exp(-½ d²/0.386²).
+  EXPECT_TRUE(LocalMuscle::is_listed({0.1, -0.3}, 0.386));
+  EXPECT_FALSE(LocalMuscle::is_listed({0.5, 0}, 0.386)) << "its middle is within 0.4 radii";
+  EXPECT_FALSE(LocalMuscle::is_listed({0, -0.6}, 0.386));
+  EXPECT_FALSE(LocalMuscle::is_listed({0, 0}, 0.2)) << "its border is at 0.7 radii at least";
+  EXPECT_FALSE(LocalMuscle::is_listed({0, 0}, 0.6));
 }
 
 TEST(StandIns, AreOfOneBreastByItself) {

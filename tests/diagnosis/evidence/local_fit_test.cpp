@@ -125,6 +125,19 @@ TEST(LocalFit, IsAskedHoweverUnlikelyNothingIsWhereItIsLikelyBesideEffects) {
   EXPECT_LT(causes[0].high, 0);
 }
 
+TEST(LocalFit, AHillThatTheCatalogueListsIsNoUnlistedMuscle) {
+  simulation::Model truth = supine::testing::twin_truth();
+  simulation::EffectSetting hill = simulation::null_setting(*simulation::find_effect("chest_wall_motion"));
+  hill.parameters.at("amplitude_mm").value = 1.5 * low_mm;
+  hill.parameters.at("centre_lateral").value = 0.3;
+  truth.effects.push_back(hill);
+  Fitted fitted(truth);
+  EXPECT_GT(weigh_unlisted(*fitted.base, fitted.priors, fitted.hypotheses).probability, 0.2) << "it is asked for";
+  for (const FollowedCause& one :
+       follow_local_causes(fitted.twin.scene(), fitted.given, *fitted.base, fitted.priors, fitted.hypotheses))
+    EXPECT_NE(one.kind, LocalKind::muscle);
+}
+
 TEST(LocalFit, IsNotAskedWhereNothingMayBeTold) {
   Fitted fitted(supine::testing::twin_truth());
   EXPECT_LT(weigh_unlisted(*fitted.base, fitted.priors, fitted.hypotheses).probability, 0.2);
