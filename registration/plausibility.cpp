@@ -319,9 +319,9 @@ Readings examine_readings(const calibration::Scan& scan, const std::vector<PoseS
   }
   consider(shifted_reading(bench));
   const double eased_mm = best_of_starts(bench, {}, turned).misfit_mm;
-  for (const auto& other : {found.mirrored, found.upended, turned_reading(bench, false), turned_reading(bench, true)})
+  for (const auto& other : {found.mirrored, found.upended, turned_reading(bench, false), turned_reading(bench, true),
+                            resized_reading(bench)})
     if (other && other->misfit_mm < at_ease * eased_mm) consider(other);
-  consider(resized_reading(bench));
   return found;
 }
 
