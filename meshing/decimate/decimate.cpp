@@ -140,4 +140,15 @@ DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
   return result;
 }
 
+DecimateResult decimate_within(const Surface& in, double loosest_mm, DecimateOptions& options) {
+  DecimateResult result = decimate(in, options);
+  if (result.reached_target || !(loosest_mm > options.max_distance_mm)) return result;
+  DecimateOptions looser = options;
+  looser.max_distance_mm = loosest_mm;
+  DecimateResult other = decimate(in, looser);
+  if (other.surface.triangles.rows() >= result.surface.triangles.rows()) return result;
+  options = looser;
+  return other;
+}
+
 }  // namespace supine::meshing

@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 using meshing::DecimateResult;
 using reconstruction::region_names;
 
+constexpr double loosest_bent = 2;  // times the bound, of flat triangles that will be bent: docs/meshing.md
+
 class DecimateTool : public Tool {
  public:
   std::string name() const override { return "supine-decimate"; }
@@ -49,7 +51,8 @@ class DecimateTool : public Tool {
         ->capture_default_str();
     app.add_option("--max-distance-mm", max_distance_mm_,
                    "bound on the distance to the input, either way, mm, > 0; default: 1, and of a surface of more than "
-                   "900 cm2 as much more as it is larger, up to 3");
+                   "900 cm2 as much more as it is larger, up to 3; --order 2: twice that where "
+                   "the number of triangles needs it");
     app.add_option("--faces", options_.target_faces, "instead: about so many quads and lone triangles, >= 50");
     app.add_option("--edge-mm", options_.edge_mm, "instead: edge length, mm, > 0");
     app.add_option("--method", method_, "quads, or triangles of one size")
@@ -75,7 +78,14 @@ class DecimateTool : public Tool {
     follow_body(in, run);
     options_.progress = [&run](const std::string& line) { run.progress(line); };
     if (!finer_.empty()) options_.relative_size = relative_size(in);
-    const DecimateResult result = meshing::decimate(in, options_);
+    const bool bent = order_ == 2 && !max_distance_mm_;
+    const double first_mm = options_.max_distance_mm;
+    const DecimateResult result = meshing::decimate_within(in, bent ? loosest_bent * first_mm : first_mm, options_);
+    if (options_.max_distance_mm > first_mm)
+      run.say(
+          fmt::format("within {:g} mm more triangles are needed; within {:g} mm, since the cells are bent onto the "
+                      "fine surface",
+                      first_mm, options_.max_distance_mm));
     run.stage("write");
     const fs::path target = output.empty() ? fs::path(surface_).parent_path() / "coarse.vtp" : output;
     reconstruction::write_surface(result.surface, run.output(target), {{"quad", result.quad}});

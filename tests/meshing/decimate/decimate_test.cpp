@@ -88,6 +88,19 @@ TEST(Decimate, TightBoundTakesMoreTrianglesAndSaysSo) {
   EXPECT_NE(result.reason.find("0.1 mm"), std::string::npos) << result.reason;
 }
 
+TEST(Decimate, ALooserBoundIsTakenWhereTheNumberNeedsIt) {
+  const Surface in = ball(40, 5);
+  DecimateOptions options{.target_triangles = 200, .max_distance_mm = 0.1};
+  const DecimateResult result = decimate_within(in, 3, options);
+  EXPECT_TRUE(result.reached_target) << result.reason;
+  EXPECT_EQ(options.max_distance_mm, 3);
+  expect_promises(in, result, options);
+  DecimateOptions enough{.target_triangles = 1500, .max_distance_mm = 1};
+  const DecimateResult first = decimate(in, enough), same = decimate_within(in, 3, enough);
+  EXPECT_EQ(enough.max_distance_mm, 1) << "what is reached is not loosened";
+  EXPECT_EQ(first.surface.points, same.surface.points);
+}
+
 TEST(Decimate, ABoundThatNoCoarserSurfaceKeepsGivesTheInputBack) {
   const Surface in = ball(40, 4);
   const DecimateResult result = decimate(in, {.target_triangles = 200, .max_distance_mm = 1e-4});
