@@ -181,12 +181,15 @@ std::string unlisted_cause(const Json& unlisted) {
   if (!(number(unlisted, "probability") >= worth_telling)) return "";
   const Json &place = unlisted.at("place_mm"), &reach = unlisted.at("interval95");
   const bool moved = unlisted.contains("moved_mm");
+  const double size = number(unlisted, moved ? "moved_mm" : "times_as_stiff");
+  const double sign = moved && size < 0 ? -1 : 1;
+  const auto [low, high] = std::minmax({sign * reach[0].get<double>(), sign * reach[1].get<double>()});
+  const char* how = sign < 0 ? "mm deeper" : moved ? "mm further outward" : "times as stiff";
   return fmt::format(
       "Something local that no effect lists has probability {:.2f}: the {} about ({:.0f}, {:.0f}, {:.0f}) mm {} {:.2g} "
       "{} (95 %: {:.2g} to {:.2g}).",
       number(unlisted, "probability"), unlisted.value("likeliest", "?"), place[0].get<double>(), place[1].get<double>(),
-      place[2].get<double>(), moved ? "lies" : "is", number(unlisted, moved ? "moved_mm" : "times_as_stiff"),
-      moved ? "mm further outward" : "times as stiff", reach[0].get<double>(), reach[1].get<double>());
+      place[2].get<double>(), moved ? "lies" : "is", sign * size, how, low, high);
 }
 
 void add_facts(const Json& diagnosis, const Collected& collected, const char* body, Answer& answer) {

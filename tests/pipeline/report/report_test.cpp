@@ -349,6 +349,9 @@ TEST(ReportAnswer, SaysWhereSomethingLocalIsThatNoEffectLists) {
             "build/bin/supine-model add local_stiffness mycase/model.toml --with log_ratio=1.36 --with of=tissue && "
             "make CASE=mycase calibrate");
   expect_words(answer().next, {"put the local cause into the model"});
+  unlisted.erase("times_as_stiff");
+  unlisted["likeliest"] = "muscle", unlisted["moved_mm"] = -4.2, unlisted["interval95"] = {-6.1, -2.3};
+  expect_words(facts(), {"muscle about (12, -40, 33) mm lies 4.2 mm deeper (95 %: 2.3 to 6.1)"});
   unlisted["probability"] = 0.1;
   EXPECT_EQ(facts().find("no effect lists"), std::string::npos) << "as likely as it was before";
 }
