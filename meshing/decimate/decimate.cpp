@@ -141,8 +141,10 @@ DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
 }
 
 DecimateResult decimate_within(const Surface& in, double loosest_mm, DecimateOptions& options) {
+  constexpr double grown = 1.5;  // of the number asked for: less of it is worth its nearness
   DecimateResult result = decimate(in, options);
-  if (result.reached_target || !(loosest_mm > options.max_distance_mm)) return result;
+  const auto triangles = static_cast<double>(result.surface.triangles.rows());
+  if (!(loosest_mm > options.max_distance_mm) || triangles < grown * options.target_triangles) return result;
   DecimateOptions looser = options;
   looser.max_distance_mm = loosest_mm;
   DecimateResult other = decimate(in, looser);

@@ -63,8 +63,9 @@ struct DecimateResult {
 /// @throws InputError  in is not such a surface (names the first place), options out of range
 DecimateResult decimate(const reconstruction::Surface& in, const DecimateOptions& options);
 
-/// The same, and where the number asked for needs a looser bound, within @p loosest_mm: for a surface whose cells are
-/// bent onto the input afterwards, to which the distance of flat triangles is not what they will err by.
+/// The same, and where that takes half as many triangles again as are asked for, within @p loosest_mm: for a surface
+/// whose cells are bent onto the input afterwards, of which the distance of flat triangles is not what they will err
+/// by.
 /// @param options  out: max_distance_mm is the bound that holds
 DecimateResult decimate_within(const reconstruction::Surface& in, double loosest_mm, DecimateOptions& options);
 
