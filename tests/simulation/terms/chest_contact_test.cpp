@@ -61,7 +61,11 @@ TEST_P(ChestContactTest, ForceIsTheDerivativeOfTheEnergyAndTheTangentOfTheForce)
 TEST_P(ChestContactTest, TheConvexTangentHasNoNegativeCurvature) {
   const Sums here = at(x, X, {.tangent = true, .convex = true});
   ASSERT_GT(here.tangent.norm(), 1);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen{Eigen::MatrixXd(here.tangent)};
+  std::vector<int> touched;  // the other rows are zero
+  for (int k = 0; k < here.tangent.outerSize(); ++k)
+    if (here.tangent.col(k).norm() > 0) touched.push_back(k);
+  const Eigen::MatrixXd whole(here.tangent);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(whole(touched, touched), Eigen::EigenvaluesOnly);
   EXPECT_GT(eigen.eigenvalues().minCoeff(), -1e-9 * eigen.eigenvalues().maxCoeff());
 }
 
