@@ -265,8 +265,10 @@ std::optional<Reading> mirrored_reading(Bench& bench, int axis, const char* word
   return reading_of(best, words);
 }
 
-std::optional<Reading> resized_reading(Bench& bench) {
+/// @param eased_mm  misfit of the scan at its own size where it may move as far
+std::optional<Reading> resized_reading(Bench& bench, double eased_mm) {
   constexpr double least_log = 0.1, smallest_size = 0.3;
+  constexpr double clearly_smaller = 0.75;  // a body that falls further than the model is a smaller one, by and large
   constexpr std::pair<const char*, double> units[] = {
       {"in metres", 1000}, {"in cm", 10}, {"in inches", 25.4}, {"in micrometres", 0.001}, {"in tenths of a mm", 0.1}};
   Laid best;
@@ -276,7 +278,7 @@ std::optional<Reading> resized_reading(Bench& bench) {
     if (laid.covered > least_covered && laid.misfit_mm < best.misfit_mm) best = laid, words = unit;
   }
   const Laid size = best_of_starts(bench, {}, resized);
-  if (size.covered > least_covered && size.misfit_mm < best.misfit_mm &&
+  if (size.covered > least_covered && size.misfit_mm < best.misfit_mm && size.misfit_mm < clearly_smaller * eased_mm &&
       std::abs(std::log(size.place.scale)) > least_log)
     best = size, words = fmt::format("{:.2f} times as large", size.place.scale);
   if (words.empty()) return std::nullopt;
@@ -319,9 +321,9 @@ Readings examine_readings(const calibration::Scan& scan, const std::vector<PoseS
   }
   consider(shifted_reading(bench));
   const double eased_mm = best_of_starts(bench, {}, turned).misfit_mm;
-  for (const auto& other : {found.mirrored, found.upended, turned_reading(bench, false), turned_reading(bench, true),
-                            resized_reading(bench)})
+  for (const auto& other : {found.mirrored, found.upended, turned_reading(bench, false), turned_reading(bench, true)})
     if (other && other->misfit_mm < at_ease * eased_mm) consider(other);
+  consider(resized_reading(bench, eased_mm));
   return found;
 }
 

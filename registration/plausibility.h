@@ -45,8 +45,9 @@ struct Readings {
 /// far than predicted (a share of 0.4, 1 sigma), so that a model that is not calibrated does not speak against a scan.
 /// The misfit is the root of the mean of min(d, 10 mm)² over the scan points over the skin. Another reading fits far
 /// better when it leaves less than half of a misfit of more than 2 mm over at least four fifths of the skin that
-/// the scan covers as given, and a quarter of all of it; a turned, mirrored or resized one also less than 0.6 of what
-/// the scan itself leaves when it may move as far as those (60 mm, 5°). Distances are taken at up to 240 points; the
+/// the scan covers as given, and a quarter of all of it; a turned or mirrored one also less than 0.6, one of
+/// another size than units make less than 0.75, of what the scan itself leaves when it may move as far (60 mm, 5°).
+/// Distances are taken at up to 240 points; the
 /// answer does not depend on threads.
 /// @param shapes  first that of the scan's own pose; of others at least the imaged one
 Readings examine_readings(const calibration::Scan& scan, const std::vector<PoseShape>& shapes);
