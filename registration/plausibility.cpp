@@ -268,7 +268,7 @@ std::optional<Reading> mirrored_reading(Bench& bench, int axis, const char* word
 /// @param eased_mm  misfit of the scan at its own size where it may move as far
 std::optional<Reading> resized_reading(Bench& bench, double eased_mm) {
   constexpr double least_log = 0.1, smallest_size = 0.3;
-  constexpr double clearly_smaller = 0.75;  // a body that falls further than the model is a smaller one, by and large
+  constexpr double clearly_smaller = 0.75;  // a scan that lies far off fits at another size too, by and large
   constexpr std::pair<const char*, double> units[] = {
       {"in metres", 1000}, {"in cm", 10}, {"in inches", 25.4}, {"in micrometres", 0.001}, {"in tenths of a mm", 0.1}};
   Laid best;
