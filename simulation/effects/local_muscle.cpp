@@ -6,49 +6,37 @@
 #include <numbers>
 
 #include "meshing/anatomy.h"
+#include "simulation/effects/about_a_place.h"
 #include "simulation/effects/chest_wall_motion.h"
 #include "simulation/fields.h"
 
 namespace supine::simulation {
 
 const std::vector<Parameter>& LocalMuscle::parameters() const {
-  static const std::vector<Parameter> rows = {{.name = "offset_mm",
-                                               .unit = "mm",
-                                               .lower = -15,
-                                               .upper = 15,
-                                               .median = 0,
-                                               .spread = 5,
-                                               .meaning = "how far the muscle has come out in the middle"},
-                                              {.name = "centre_lateral",
-                                               .unit = "1",
-                                               .lower = -1.5,
-                                               .upper = 1.5,
-                                               .median = 0,
-                                               .spread = 0.4,
-                                               .meaning = "the middle from the foot's, in foot radii",
-                                               .shape = true},
-                                              {.name = "centre_head",
-                                               .unit = "1",
-                                               .lower = -1.5,
-                                               .upper = 1.5,
-                                               .median = 0,
-                                               .spread = 0.4,
-                                               .meaning = "the same toward the head",
-                                               .shape = true},
-                                              {.name = "length",
-                                               .unit = "1",
-                                               .null = 0.4,
-                                               .lower = 0.1,
-                                               .upper = 1,
-                                               .median = 0.4,
-                                               .spread = 0.15,
-                                               .meaning = "distance at which 61 % of it are left, in foot radii",
-                                               .shape = true}};
+  static const std::vector<Parameter> rows = {
+      {.name = "offset_mm",
+       .unit = "mm",
+       .lower = -15,
+       .upper = 15,
+       .median = 0,
+       .spread = 5,
+       .meaning = "how far the muscle has come out in the middle"},
+      centre_anywhere("centre_lateral", "the middle from the foot's, in foot radii"),
+      centre_anywhere("centre_head", "the same toward the head"),
+      {.name = "length",
+       .unit = "1",
+       .null = 0.4,
+       .lower = 0.1,
+       .upper = 1,
+       .median = 0.4,
+       .spread = 0.15,
+       .meaning = "distance at which 61 % of it are left, in foot radii",
+       .shape = true}};
   return rows;
 }
 
 bool LocalMuscle::belongs_to(const meshing::TetMesh&, const meshing::Anatomy& anatomy, const Model&) const {
-  return !anatomy.is_object() && anatomy.breasts.empty();
+  return is_one_breast(anatomy);
 }
 
 bool LocalMuscle::is_listed(const Eigen::Vector2d& centre, double length) {

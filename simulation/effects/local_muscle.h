@@ -22,7 +22,7 @@ class LocalMuscle : public Effect {
   const std::vector<Parameter>& parameters() const override;
   bool belongs_to(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model) const override;
   /// Whether such a hill is one of those that chest_wall_motion lists: its middle stands, and it is as wide at half of
-  /// its height, as that can.
+  /// its height, as that can. Both in foot radii.
   static bool is_listed(const Eigen::Vector2d& centre, double length);
   void apply(const Scene& scene, std::span<const Dual> values, const std::map<std::string, std::string>& options,
              Fields<Dual>& fields) const override;

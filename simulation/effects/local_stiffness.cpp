@@ -3,52 +3,40 @@
 
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
+#include "simulation/effects/about_a_place.h"
 #include "simulation/fields.h"
 
 namespace supine::simulation {
 
 const std::vector<Parameter>& LocalStiffness::parameters() const {
-  static const std::vector<Parameter> rows = {{.name = "log_ratio",
-                                               .unit = "1",
-                                               .lower = -4,
-                                               .upper = 4,
-                                               .median = 0,
-                                               .spread = 1,
-                                               .meaning = "ln of how many times as stiff it is in the middle"},
-                                              {.name = "centre_lateral",
-                                               .unit = "1",
-                                               .lower = -1.5,
-                                               .upper = 1.5,
-                                               .median = 0,
-                                               .spread = 0.4,
-                                               .meaning = "the middle from the foot's, in foot radii",
-                                               .shape = true},
-                                              {.name = "centre_head",
-                                               .unit = "1",
-                                               .lower = -1.5,
-                                               .upper = 1.5,
-                                               .median = 0,
-                                               .spread = 0.4,
-                                               .meaning = "the same toward the head",
-                                               .shape = true},
-                                              {.name = "height",
-                                               .unit = "1",
-                                               .null = 0.5,
-                                               .lower = 0,
-                                               .upper = 2,
-                                               .median = 0.5,
-                                               .spread = 0.3,
-                                               .meaning = "of the middle over the muscle, in foot radii",
-                                               .shape = true},
-                                              {.name = "length",
-                                               .unit = "1",
-                                               .null = 0.3,
-                                               .lower = 0.1,
-                                               .upper = 1,
-                                               .median = 0.3,
-                                               .spread = 0.1,
-                                               .meaning = "distance at which 61 % of it are left, in foot radii",
-                                               .shape = true}};
+  static const std::vector<Parameter> rows = {
+      {.name = "log_ratio",
+       .unit = "1",
+       .lower = -4,
+       .upper = 4,
+       .median = 0,
+       .spread = 1,
+       .meaning = "ln of how many times as stiff it is in the middle"},
+      centre_anywhere("centre_lateral", "the middle from the foot's, in foot radii"),
+      centre_anywhere("centre_head", "the same toward the head"),
+      {.name = "height",
+       .unit = "1",
+       .null = 0.5,
+       .lower = 0,
+       .upper = 2,
+       .median = 0.5,
+       .spread = 0.3,
+       .meaning = "of the middle over the muscle, in foot radii",
+       .shape = true},
+      {.name = "length",
+       .unit = "1",
+       .null = 0.3,
+       .lower = 0.1,
+       .upper = 1,
+       .median = 0.3,
+       .spread = 0.1,
+       .meaning = "distance at which 61 % of it are left, in foot radii",
+       .shape = true}};
   return rows;
 }
 
@@ -58,7 +46,7 @@ const std::vector<OptionRow>& LocalStiffness::options() const {
 }
 
 bool LocalStiffness::belongs_to(const meshing::TetMesh&, const meshing::Anatomy& anatomy, const Model&) const {
-  return !anatomy.is_object() && anatomy.breasts.empty();
+  return is_one_breast(anatomy);
 }
 
 Eigen::Vector3d anatomy_place(const Scene& scene, const Eigen::Ref<const Eigen::RowVectorXi>& nodes) {
