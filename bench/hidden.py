@@ -4,7 +4,7 @@
 
     bench/hidden.py WORK --bin build/bin [--realistic | --prior | --set pairs|foreign|doses [--realistic]]
                     [--cases N] [--seed N | --seed-from TAG] [--quarter 1..4] [--rows FILE] [--first 1] [--jobs 2]
-                    [--no-tilt] [--only odd|even] [--again [--label LABEL]]
+                    [--registration-mm MM] [--no-tilt] [--only odd|even] [--again [--label LABEL]]
 
 WORK/cases/case-001 ... what the tools read; WORK/answers/case-001.json the answers; WORK/out/case-001 what the tools
 wrote. What is scored of a case is a row of WORK/rows.jsonl (--rows), written as soon as the case is done. A call goes
@@ -50,6 +50,12 @@ def make_case(work, binaries, name, options):
     code, seconds = run([binaries / "supine-phantom", *options, "-o", work / "cases" / name, "--answer", answer,
                          "--threads", "1", "--force"], log)
     return code == 0, seconds
+
+
+def state_registration(case, registration_mm):
+    """Scans of the mixture lie where they are said to; the case tells the tools how well that is known."""
+    file = case / "case.toml"
+    file.write_text(re.sub(r'(?m)^surface = .*$', rf"\g<0>\nregistration_mm = {registration_mm}", file.read_text()))
 
 
 def note_seconds(out, seconds):
@@ -112,7 +118,10 @@ def one_case(work, options, name, words):
         diagnose_again(work, options.bin, name, options.label, not options.no_tilt)
     else:
         words = words + ([] if options.no_tilt else ["--tilt"])
+        fresh = not (work / "answers" / f"{name}.json").exists()
         made, seconds = make_case(work, options.bin, name, words)
+        if made and fresh and options.registration_mm is not None:
+            state_registration(work / "cases" / name, options.registration_mm)
         if made:
             (out / name).mkdir(parents=True, exist_ok=True)
             if seconds:
@@ -171,6 +180,8 @@ def parser():
     parser.add_argument("--seed-from", metavar="TAG", help="the seed is a hash of this tag's commit")
     parser.add_argument("--rows", type=pathlib.Path, help="default WORK/rows.jsonl")
     parser.add_argument("--jobs", type=int, default=2, help="cases side by side, one thread each")
+    parser.add_argument("--registration-mm", type=float, metavar="MM",
+                        help="each case states that its scans lie in place within this, 1 sigma")
     parser.add_argument("--no-tilt", action="store_true", help="the supine scan alone")
     parser.add_argument("--only", choices=["odd", "even"], help="cases with such a seed")
     parser.add_argument("--again", action="store_true", help="diagnose once more, into WORK/out-LABEL")
@@ -206,6 +217,8 @@ def wanted(options):
 def run_all(work, options, rows, cases):
     """@return names of those without a result"""
     stamp = {"set": options.name, **program(options.bin)}
+    if options.registration_mm is not None:
+        stamp["registration_mm"] = options.registration_mm
     empty = []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         waiting = {pool.submit(one_case, work, options, name, words): name for name, words in cases}

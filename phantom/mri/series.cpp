@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "phantom/random.h"
 
@@ -18,10 +19,12 @@ constexpr Greys t1_greys{0, 1, 0.38, 0.42, 0.26, 0.3, 0.22, 0.07},
     fatsat_greys{0, 0.37, 1, 1.05, 0.32, 0.36, 0.8, 0.06}, t2_greys{0, 0.16, 0.75, 0.3, 0.14, 0.35, 1, 0.06};
 constexpr double full_scale = 1000;
 constexpr int across = 2, along = 3;  // finer points a voxel
+constexpr int finer = 4;              // across, where fat and water cancel
+constexpr double fat_shift_hz = 217;  // of fat against water at 1.5 T (3.4 ppm)
 constexpr double coil_mm = 70;        // of the sensitivity's decay
 
 struct Spoiling {
-  double noise, shift_mm, ghost, coil_depth;
+  double noise, shift_mm, ghost, coil_depth, fat_phase;
   std::array<Vector3d, 2> coil, failure;
   std::array<double, 2> failure_gain{}, failure_mm{};
 };
@@ -30,8 +33,16 @@ const Greys& greys_of(Series series) {
   return series == Series::t1 ? t1_greys : series == Series::fatsat ? fatsat_greys : t2_greys;
 }
 
-Spoiling draw(const Torso& torso, Random& random, const SeriesOptions& options) {
+/// Of fat against water at the echo. A fast gradient echo with fat suppression (fatsat) comes before both are in phase
+/// again (4.6 ms); T1 is made in phase, a spin echo (t2) brings both back.
+double draw_fat_phase(std::uint64_t seed, Series series) {
+  Random random(seed, "echo");
+  return series == Series::fatsat ? 2 * std::numbers::pi * fat_shift_hz * random.uniform(1.4e-3, 2.7e-3) : 0;
+}
+
+Spoiling draw(const Torso& torso, Random& random, std::uint64_t seed, const SeriesOptions& options) {
   Spoiling s;
+  s.fat_phase = draw_fat_phase(seed, options.series);
   const bool fat = options.series != Series::t1;
   s.noise = full_scale * (fat ? random.uniform(0.02, 0.05) : random.uniform(0.008, 0.02));
   s.shift_mm = random.uniform(0, 2);
@@ -81,36 +92,53 @@ segmentation::Grid draw_grid(const Torso& torso, Random& random, const SeriesOpt
   return grid;
 }
 
+/// What finer points of a voxel hold, means over them.
+struct VoxelSample {
+  std::array<int, stuff_count> count{};
+  double water = 0, fat = 0, points = 0;
+
+  bool is_mixed() const { return water > 0 && fat > 0; }
+  /// Fat and water of one voxel cancel where they are out of phase: a dark line on every border between the two.
+  double grey(double phase) const { return std::hypot(water + fat * std::cos(phase), fat * std::sin(phase)) / points; }
+};
+
+VoxelSample sample_voxel(const Torso& torso, const Spoiling& s, const SeriesOptions& options, const Vector3d& middle,
+                         const Vector3d& spacing_mm, int across_points) {
+  const Greys& greys = greys_of(options.series);
+  VoxelSample sample;
+  for (int c = 0; c < along; ++c)
+    for (int b = 0; b < across_points; ++b)
+      for (int a = 0; a < across_points; ++a) {
+        const Vector3d p =
+            middle + spacing_mm.cwiseProduct(Vector3d((a + 0.5) / across_points - 0.5, (b + 0.5) / across_points - 0.5,
+                                                      (c + 0.5) / along - 0.5));
+        const Stuff here = torso.at(p);
+        ++sample.count[static_cast<int>(here)];
+        if (here != Stuff::fat) sample.water += greys[static_cast<int>(here)];
+        const Vector3d from = p - Vector3d(s.shift_mm, 0, 0);
+        if (torso.at(from) == Stuff::fat)
+          sample.fat += greys[static_cast<int>(Stuff::fat)] * fat_gain(s, from, options.all_fails);
+      }
+  sample.points = across_points * across_points * along;
+  return sample;
+}
+
 /// Greys without noise, the truth and the share of gland, by finer sampling.
 void sample_torso(const Torso& torso, const Spoiling& s, const SeriesOptions& options, MadeSeries& made) {
   const segmentation::Grid& grid = made.image.grid;
-  const Greys& greys = greys_of(options.series);
-  const auto water = [&](Stuff stuff) { return stuff == Stuff::fat ? 0.0 : greys[static_cast<int>(stuff)]; };
 #pragma omp parallel for schedule(dynamic)
   for (int k = 0; k < grid.size.z(); ++k)
     for (int j = 0; j < grid.size.y(); ++j)
       for (int i = 0; i < grid.size.x(); ++i) {
         const Vector3d middle = grid.point(Vector3d(i, j, k));
-        std::array<int, stuff_count> count{};
-        double sum = 0;
-        for (int c = 0; c < along; ++c)
-          for (int b = 0; b < across; ++b)
-            for (int a = 0; a < across; ++a) {
-              const Vector3d p =
-                  middle + grid.spacing_mm.cwiseProduct(
-                               Vector3d((a + 0.5) / across - 0.5, (b + 0.5) / across - 0.5, (c + 0.5) / along - 0.5));
-              const Stuff here = torso.at(p);
-              ++count[static_cast<int>(here)];
-              sum += water(here);
-              const Vector3d from = p - Vector3d(s.shift_mm, 0, 0);
-              if (torso.at(from) == Stuff::fat)
-                sum += greys[static_cast<int>(Stuff::fat)] * fat_gain(s, from, options.all_fails);
-            }
+        VoxelSample sample = sample_voxel(torso, s, options, middle, grid.spacing_mm, across);
+        if (s.fat_phase != 0 && sample.is_mixed())
+          sample = sample_voxel(torso, s, options, middle, grid.spacing_mm, finer);
         const std::size_t n = grid.index(i, j, k);
-        constexpr int all = across * across * along;
-        made.image.voxels[n] = static_cast<float>(full_scale * sensitivity(s, middle) * sum / all);
-        made.truth.voxels[n] = static_cast<std::uint8_t>(std::max_element(count.begin(), count.end()) - count.begin());
-        made.gland_share[n] = static_cast<float>(count[static_cast<int>(Stuff::gland)]) / all;
+        made.image.voxels[n] = static_cast<float>(full_scale * sensitivity(s, middle) * sample.grey(s.fat_phase));
+        made.truth.voxels[n] = static_cast<std::uint8_t>(std::max_element(sample.count.begin(), sample.count.end()) -
+                                                         sample.count.begin());
+        made.gland_share[n] = static_cast<float>(sample.count[static_cast<int>(Stuff::gland)] / sample.points);
       }
 }
 
@@ -135,7 +163,7 @@ void turn_round(segmentation::Grid& grid) {  // the same voxels, said to lie wit
 
 MadeSeries make_series(const Torso& torso, std::uint64_t seed, const SeriesOptions& options) {
   Random random(seed, "series"), noise(seed, "noise");
-  const Spoiling spoiling = draw(torso, random, options);
+  const Spoiling spoiling = draw(torso, random, seed, options);
   MadeSeries made;
   made.image.grid = made.truth.grid = draw_grid(torso, random, options);
   const std::size_t count = made.image.grid.count();

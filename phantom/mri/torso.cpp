@@ -13,6 +13,7 @@ namespace {
 constexpr double texture_step_mm = 3.5, texture_length_mm = 7;
 constexpr double nipple_radius_mm = 5, nipple_height_mm = 5;
 constexpr double gland_under_skin_mm = 5, gland_over_chest_mm = 6;
+constexpr double least_fat_mm = 3;  // between skin and pectoral muscle
 constexpr int strands = 14;
 constexpr double strand_mm = 2.2;  // radius at the nipple; it thins out
 
@@ -94,7 +95,8 @@ double Torso::chest_y_mm(double x, double z) const {
   // The pectoral muscle: from beside the sternum to its own outer edge, above the fold; thin at the edges.
   const double a = std::clamp((std::abs(x) - 6) / 12, 0.0, 1.0) *
                    std::clamp((pectoral_x_ - std::abs(x)) / 6, 0.0, 1.0) * std::clamp((z + 55) / 25, 0.0, 1.0);
-  return oval - pectoral_mm_ * a;
+  // Beside the sternum a thin body has little room for it: some fat stays between muscle and skin.
+  return std::max(oval - pectoral_mm_ * a, bare_skin_y_mm(x, z) + skin_mm_ + least_fat_mm);
 }
 
 double Torso::bare_skin_y_mm(double x, double z) const {

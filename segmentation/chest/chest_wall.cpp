@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "common/error.h"
 #include "segmentation/chest/boundary_cost.h"
@@ -73,9 +74,9 @@ void hold_back(const FrontSkin& front, const ChestWall& wall, const RayProfiles&
   }
 }
 
-/// The superellipse whose border is cheapest, taken over a few millimetres to either side: no chest is one.
-Superellipse fit_superellipse(const RayProfiles& profiles, const std::vector<float>& costs, const ChestWall& wall,
-                              double centre_depth_mm) {
+/// The superellipses whose border is cheapest, taken over a few millimetres to either side: no chest is one.
+std::vector<Superellipse> fit_superellipses(const RayProfiles& profiles, const std::vector<float>& costs,
+                                            const ChestWall& wall, const ChestWallOptions& options) {
   const int blur = static_cast<int>(superellipse_blur_mm / RayProfiles::step_mm), n = profiles.count;
   std::vector<float> near(costs.size());
 #pragma omp parallel for schedule(static)
@@ -99,7 +100,10 @@ Superellipse fit_superellipse(const RayProfiles& profiles, const std::vector<flo
       }
     return sum;
   };
-  return best_superellipse(cost, centre_depth_mm, wall.z(profiles.levels() / 2));
+  const double middle_z_mm = wall.z(profiles.levels() / 2);
+  if (options.border == ChestWallOptions::Border::line)
+    return superellipses_with_plates(cost, options.centre_depth_mm, middle_z_mm);
+  return {best_superellipse(cost, options.centre_depth_mm, middle_z_mm)};
 }
 
 /// The radius nearest to `radius` at which the grey rises through the half-way level; `radius` when there is none.
@@ -166,6 +170,24 @@ void refine(const GreyImage& image, const ChestWallOptions& options, ChestWall& 
       wall.radius_mm(a, k) = half_way(image, options, wall.centre(k), wall.direction(a), wall.radius_mm(a, k));
 }
 
+/// Looks along the border itself, from a superellipse on: what the first look saw is too noisy.
+/// @return cost of the data there
+double look_closer(const GreyImage& image, const Mask& body, const FrontSkin& front, const ChestWallOptions& options,
+                   ChestWall& wall) {
+  for (Eigen::Index k = 0; k < wall.radius_mm.cols(); ++k)
+    for (Eigen::Index a = 0; a < wall.radius_mm.rows(); ++a)
+      wall.radius_mm(a, k) = wall.superellipse.radius_mm(wall.angle(a), wall.z(k));
+  for (const Look& look : closer_looks) {
+    RayProfiles profiles = sample_rays(image, body, wall, wall.radius_mm, -look.reach_mm, look.reach_mm);
+    blur_profiles(profiles, look.angles, look.levels);
+    std::vector<float> costs = boundary_costs(profiles, options, true);
+    hold_back(front, wall, profiles, options, costs);
+    if (look.even) make_even(profiles, costs);
+    settle(profiles, costs, options, wall);
+  }
+  return wall.cost.isNaN().select(0, wall.cost).sum();
+}
+
 void check(const ChestWallOptions& o) {
   if (!(o.bright > o.dark))
     throw InputError(fmt::format("chest_wall: bright = {} must be above dark = {}", o.bright, o.dark));
@@ -213,25 +235,24 @@ ChestWall find_chest_wall(const GreyImage& image, const Mask& body, const Torso&
   if (lines) blur_profiles(profiles, first_look.angles, first_look.levels);
   std::vector<float> costs = boundary_costs(profiles, options);
   hold_back(front, wall, profiles, options, costs);
-  wall.superellipse = fit_superellipse(profiles, costs, wall, options.centre_depth_mm);
-  settle(profiles, costs, options, wall);
+  const std::vector<Superellipse> shapes = fit_superellipses(profiles, costs, wall, options);
+  wall.superellipse = shapes.front();
   if (!lines) {
+    settle(profiles, costs, options, wall);
     refine(image, options, wall);
     return wall;
   }
-  // What the first look saw is too noisy: start from the superellipse.
-  for (Eigen::Index k = 0; k < profiles.levels(); ++k)
-    for (Eigen::Index a = 0; a < profiles.angles(); ++a)
-      wall.radius_mm(a, k) = wall.superellipse.radius_mm(wall.angle(a), wall.z(k));
-  for (const Look& look : closer_looks) {
-    profiles = sample_rays(image, body, wall, wall.radius_mm, -look.reach_mm, look.reach_mm);
-    blur_profiles(profiles, look.angles, look.levels);
-    costs = boundary_costs(profiles, options, true);
-    hold_back(front, wall, profiles, options, costs);
-    if (look.even) make_even(profiles, costs);
-    settle(profiles, costs, options, wall);
+  wall.radius_mm.resize(profiles.angles(), profiles.levels());
+  std::optional<ChestWall> best;
+  double least = 0;
+  for (const Superellipse& shape : shapes) {
+    wall.superellipse = shape;
+    const double cost = look_closer(image, body, front, options, wall);
+    if (best && cost >= least) continue;
+    best = wall;
+    least = cost;
   }
-  return wall;
+  return *best;
 }
 
 }  // namespace supine::segmentation

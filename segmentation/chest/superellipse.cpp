@@ -6,33 +6,83 @@
 #include <vector>
 
 namespace supine::segmentation {
+namespace {
+
+constexpr double plate_begins_mm = 6, plate_rises_mm = 12;  // beside the sternum; it thins as far at the outer edge
+constexpr double thickest_plate_mm = 15, roundest = 1.8, squarest = 4;
+
+/// What the plate adds along a ray whose bare end is at `bare`.
+double plate_radius_mm(const Superellipse& shape, double angle_rad, double bare) {
+  const double ahead = std::cos(angle_rad);
+  if (ahead < 0.2) return 0;
+  double more = 0;
+  for (int n = 0; n < 3; ++n) {  // the plate is as thick as it is where the ray leaves it
+    const double x = (bare + more) * std::abs(std::sin(angle_rad));
+    more = shape.plate_mm / ahead * std::clamp((x - plate_begins_mm) / plate_rises_mm, 0.0, 1.0) *
+           std::clamp((shape.plate_edge_mm - x) / plate_rises_mm, 0.0, 1.0);
+  }
+  return more;
+}
+
+}  // namespace
 
 double Superellipse::radius_mm(double angle_rad, double z_mm) const {
   const double depth = depth_mm + depth_slope * (z_mm - middle_z_mm);
   // Behind the centre the side goes straight back.
   const double across = std::abs(std::sin(angle_rad)) / half_width_mm,
                ahead = std::max(0.0, std::cos(angle_rad)) / std::max(10.0, depth);
-  return std::pow(std::pow(across, power) + std::pow(ahead, power), -1 / power);
+  const double bare = std::pow(std::pow(across, power) + std::pow(ahead, power), -1 / power);
+  return plate_mm > 0 ? bare + plate_radius_mm(*this, angle_rad, bare) : bare;
 }
 
 namespace {
 
+using Cost = std::function<double(const Superellipse&)>;
+
+constexpr double widths_apart_mm = 7.5;
+struct Widths {
+  double least_mm, most_mm;
+};
+
+struct Scored {
+  Superellipse shape;
+  double cost;
+};
+
+Scored cheapest(const std::vector<Superellipse>& shapes, const Cost& cost) {
+  std::vector<double> sums(shapes.size());
+#pragma omp parallel for schedule(static)
+  for (std::size_t n = 0; n < shapes.size(); ++n) sums[n] = cost(shapes[n]);
+  const auto best = static_cast<std::size_t>(std::min_element(sums.begin(), sums.end()) - sums.begin());
+  return {shapes[best], sums[best]};
+}
+
+bool is_a_chest(const Superellipse& shape, const Widths& widths) {
+  return shape.half_width_mm >= widths.least_mm - widths_apart_mm &&
+         shape.half_width_mm <= widths.most_mm + widths_apart_mm && shape.power >= roundest &&
+         shape.power <= squarest && shape.plate_mm >= 0 && shape.plate_mm <= thickest_plate_mm;
+}
+
 /// Coordinate descent with halved steps from the best of the coarse ones.
-Superellipse polished(Superellipse best, double sum, const std::function<double(const Superellipse&)>& cost) {
-  const std::pair<double Superellipse::*, double> steps[] = {{&Superellipse::half_width_mm, 4},
-                                                             {&Superellipse::depth_mm, 1.5},
-                                                             {&Superellipse::depth_slope, 0.05},
-                                                             {&Superellipse::power, 0.25}};
+Scored polished(Scored best, const Widths& widths, const Cost& cost) {
+  std::vector<std::pair<double Superellipse::*, double>> steps = {{&Superellipse::half_width_mm, 4},
+                                                                  {&Superellipse::depth_mm, 1.5},
+                                                                  {&Superellipse::depth_slope, 0.05},
+                                                                  {&Superellipse::power, 0.25}};
+  if (best.shape.plate_mm > 0) {
+    steps.emplace_back(&Superellipse::plate_mm, 2);
+    steps.emplace_back(&Superellipse::plate_edge_mm, 4);
+  }
   for (double share = 1; share > 0.2;) {
     bool better = false;
     for (const auto& [member, step] : steps)
       for (const double sign : {-1.0, 1.0}) {
-        Superellipse other = best;
+        Superellipse other = best.shape;
         other.*member += sign * share * step;
+        if (!is_a_chest(other, widths)) continue;
         const double value = cost(other);
-        if (value >= sum) continue;
-        sum = value;
-        best = other;
+        if (value >= best.cost) continue;
+        best = {other, value};
         better = true;
       }
     if (!better) share /= 2;
@@ -40,23 +90,49 @@ Superellipse polished(Superellipse best, double sum, const std::function<double(
   return best;
 }
 
-}  // namespace
-
-Superellipse best_superellipse(const std::function<double(const Superellipse&)>& cost, double centre_depth_mm,
-                               double middle_z_mm) {
-  std::vector<Superellipse> candidates;
+std::vector<Superellipse> bare_shapes(const Widths& widths, double centre_depth_mm, double middle_z_mm) {
+  std::vector<Superellipse> shapes;
   for (const double power : {2.0, 2.5, 3.0})
-    for (double half_width = 100; half_width <= 175; half_width += 7.5)
+    for (double half_width = widths.least_mm; half_width <= widths.most_mm; half_width += widths_apart_mm)
       for (double under = 3; under <= 45; under += 3)
         for (const double slope : {-0.4, -0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4})
-          candidates.push_back({half_width, centre_depth_mm - under, slope, power, middle_z_mm});
-  std::vector<double> sums(candidates.size());
-#pragma omp parallel for schedule(static)
-  for (std::size_t n = 0; n < candidates.size(); ++n) sums[n] = cost(candidates[n]);
-  std::size_t best = 0;
-  for (std::size_t n = 1; n < candidates.size(); ++n)
-    if (sums[n] < sums[best]) best = n;
-  return polished(candidates[best], sums[best], cost);
+          shapes.push_back({half_width, centre_depth_mm - under, slope, power, middle_z_mm});
+  return shapes;
+}
+
+/// What was found bare may have followed the muscles in part: the chest under them is rounder, and lies up to their
+/// thickness deeper.
+std::vector<Superellipse> with_plates(const Superellipse& bare) {
+  std::vector<Superellipse> shapes;
+  for (const double thickness : {5.0, 9.0, 13.0})
+    for (const double edge : {80.0, 90.0, 100.0, 110.0})
+      for (const double deeper : {0.0, 0.5, 1.0})
+        for (const double rounder : {0.0, 0.5, 1.0}) {
+          Superellipse shape = bare;
+          shape.power = std::max(roundest, shape.power - rounder);
+          shape.depth_mm -= deeper * thickness;
+          shape.plate_mm = thickness;
+          shape.plate_edge_mm = edge;
+          shapes.push_back(shape);
+        }
+  return shapes;
+}
+
+}  // namespace
+
+Superellipse best_superellipse(const Cost& cost, double centre_depth_mm, double middle_z_mm) {
+  constexpr Widths any{100, 175};
+  return polished(cheapest(bare_shapes(any, centre_depth_mm, middle_z_mm), cost), any, cost).shape;
+}
+
+std::vector<Superellipse> superellipses_with_plates(const Cost& cost, double centre_depth_mm, double middle_z_mm) {
+  std::vector<Superellipse> shapes;
+  for (const Widths& widths : {Widths{100, 115}, Widths{122.5, 137.5}, Widths{145, 175}}) {
+    const Scored bare = polished(cheapest(bare_shapes(widths, centre_depth_mm, middle_z_mm), cost), widths, cost);
+    const Scored plated = polished(cheapest(with_plates(bare.shape), cost), widths, cost);
+    shapes.push_back(plated.cost < bare.cost ? plated.shape : bare.shape);
+  }
+  return shapes;
 }
 
 }  // namespace supine::segmentation

@@ -2,17 +2,21 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 namespace supine::segmentation {
 
 /// The rough cross-section of a chest as a superellipse (Lamé curve): |x / half_width|^power + |y / depth|^power = 1
-/// about the rays' centre, the depth changing linearly with z.
+/// about the rays' centre, the depth changing linearly with z; on it a plate as the pectoral muscles are, from beside
+/// the sternum to their outer edges.
 struct Superellipse {
   double half_width_mm = 140;
   double depth_mm = 72;    ///< at z = middle_z_mm
   double depth_slope = 0;  ///< d depth / dz
   double power = 2.5;
   double middle_z_mm = 0;
+  double plate_mm = 0;        ///< thickness of the muscle, toward the front; >= 0
+  double plate_edge_mm = 95;  ///< of its outer edge from the middle line
 
   double radius_mm(double angle_rad, double z_mm) const;
 };
@@ -23,5 +27,10 @@ struct Superellipse {
 /// @param centre_depth_mm  of the rays' centre behind the skin over the sternum
 Superellipse best_superellipse(const std::function<double(const Superellipse&)>& cost, double centre_depth_mm,
                                double middle_z_mm);
+
+/// The best of narrow, middling and wide chests, each with or without plates of up to 15 mm: where the sides are hardly
+/// seen, which of them is right shows only along the border itself.
+std::vector<Superellipse> superellipses_with_plates(const std::function<double(const Superellipse&)>& cost,
+                                                    double centre_depth_mm, double middle_z_mm);
 
 }  // namespace supine::segmentation

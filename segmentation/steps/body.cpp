@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/error.h"
 #include "segmentation/blur.h"
@@ -13,6 +14,7 @@ namespace supine::segmentation {
 namespace {
 
 constexpr double standing_out_mm = 1.5;
+constexpr double behind_mm = 1;  // of skin: what lies behind so much of it is no air
 
 /// The voxels of the face of the image that looks to the front (-y).
 std::vector<std::size_t> front_face(const Grid& grid) {
@@ -67,6 +69,48 @@ std::vector<float> local_maximum(const GreyImage& image, double radius_mm) {
   return field;
 }
 
+/// Whether the straight way from a voxel down the distance to sure air leads through the skin: at least behind_mm of it
+/// is no air.
+bool lies_behind_skin(const Grid& grid, const std::vector<float>& squared_mm2, const Mask& air, Eigen::Vector3i at) {
+  double solid_mm = 0;
+  while (squared_mm2[grid.index(at.x(), at.y(), at.z())] > 0) {
+    Eigen::Vector3i next = at;
+    double steepest = 0;
+    const double here = std::sqrt(squared_mm2[grid.index(at.x(), at.y(), at.z())]);
+    for (int c = -1; c <= 1; ++c)
+      for (int b = -1; b <= 1; ++b)
+        for (int a = -1; a <= 1; ++a) {
+          const Eigen::Vector3i to = at + Eigen::Vector3i(a, b, c);
+          if (to == at || !grid.contains(to.x(), to.y(), to.z())) continue;
+          const double fall = (here - std::sqrt(squared_mm2[grid.index(to.x(), to.y(), to.z())])) /
+                              Eigen::Vector3d(a, b, c).cwiseProduct(grid.spacing_mm).norm();
+          if (fall > steepest) {
+            steepest = fall;
+            next = to;
+          }
+        }
+    if (next == at) return false;
+    if (!air[grid.index(next.x(), next.y(), next.z())])
+      solid_mm += (next - at).cast<double>().cwiseProduct(grid.spacing_mm).norm();
+    if (solid_mm >= behind_mm) return true;
+    at = next;
+  }
+  return false;
+}
+
+/// Takes out of the air what came in through a hole in the skin and runs along under it.
+void drop_what_lies_behind_skin(const Grid& grid, const Mask& sure, Mask& air) {
+  const std::vector<float> squared_mm2 = squared_distance_mm2(sure, grid);
+  const Mask before = air;
+#pragma omp parallel for schedule(dynamic)
+  for (int k = 0; k < grid.size.z(); ++k)
+    for (int j = 0; j < grid.size.y(); ++j)
+      for (int i = 0; i < grid.size.x(); ++i) {
+        const std::size_t n = grid.index(i, j, k);
+        if (before[n] && !sure[n] && lies_behind_skin(grid, squared_mm2, before, {i, j, k})) air[n] = 0;
+      }
+}
+
 /// Air in front: what is surely air, and from there what is dark within peel_mm of it.
 Mask find_air(const GreyImage& image, const Body& step, const Mask& dark) {
   const Grid& grid = image.grid;
@@ -85,7 +129,12 @@ Mask find_air(const GreyImage& image, const Body& step, const Mask& dark) {
     near[n] = near[n] && (dark[n] || (!brightest.empty() && image.voxels[n] < step.edge_share * brightest[n]));
     if (sure[n]) from.push_back(n);
   }
-  return flood(near, grid, from);
+  Mask air = flood(near, grid, from);
+  if (step.edge_share > 0) {
+    drop_what_lies_behind_skin(grid, sure, air);
+    air = flood(air, grid, from);
+  }
+  return air;
 }
 
 }  // namespace

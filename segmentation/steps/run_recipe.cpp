@@ -247,9 +247,12 @@ std::string StepRunner::run(const Chest& step) {
   return store(step.mask, std::move(chest)) +
          fmt::format(
              "; middle line x = {:.1f} {:+.3f} z mm from {} levels, skin over the sternum at y = {:.1f} mm; oval "
-             "half width {:.0f}, depth {:.0f} {:+.1f} z mm, power {}",
+             "half width {:.0f}, depth {:.0f} {:+.1f} z mm, power {}{}",
              torso.sternum_x_mm, torso.sternum_slope, torso.slices, torso.sternum_skin_y_mm, shape.half_width_mm,
-             shape.depth_mm, shape.depth_slope, shape.power);
+             shape.depth_mm, shape.depth_slope, shape.power,
+             shape.plate_mm > 0 ? fmt::format(", on it muscle of {:.0f} mm as far as {:.0f} mm to either side",
+                                              shape.plate_mm, shape.plate_edge_mm)
+                                : "");
 }
 
 std::string StepRunner::run(const Planes& step) {

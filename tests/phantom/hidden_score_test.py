@@ -506,5 +506,19 @@ class WithoutTilt(unittest.TestCase):
             self.assertEqual(hidden.without_tilt(work, "case-001"), case)  # a second call finds it made
 
 
+class StatedRegistration(unittest.TestCase):
+    def test_every_scan_and_nothing_else_states_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            case = pathlib.Path(folder)
+            (case / "case.toml").write_text(CASE)
+            hidden.state_registration(case, 0.3)
+            stated = (case / "case.toml").read_text()
+            self.assertEqual(stated.replace("registration_mm = 0.3\n", ""), CASE)
+            poses = stated.split("[pose.")[1:]
+            self.assertEqual([pose.count("registration_mm = 0.3") for pose in poses],
+                             [pose.count("surface = ") for pose in poses])
+            self.assertGreater(stated.count("registration_mm = 0.3"), 1)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -43,6 +43,51 @@ std::pair<double, double> dice_of(const Torso& torso, const MadeSeries& series, 
   return {2 * both[0] / sum[0], 2 * both[1] / sum[1]};
 }
 
+/// Mean grey over the front of the pectoral muscles, by the distance in front of it (mm, -8 to 8).
+std::vector<double> across_the_muscle(const Torso& torso, const GreyImage& image) {
+  std::vector<double> sum(17, 0);
+  for (const int side : {0, 1})
+    for (double x = 30; x <= 70; x += 0.5)
+      for (double z = -20; z <= 20; z += 4)
+        for (int n = 0; n < 17; ++n) {
+          const double across = side == 0 ? -x : x;
+          const Eigen::Vector3d p(across, torso.chest_y_mm(across, z) - (n - 8), z);
+          const Eigen::Vector3i at = image.grid.continuous_index(p).array().round().cast<int>();
+          sum[n] += image.at(at.x(), at.y(), at.z());
+        }
+  return sum;
+}
+
+TEST(MadeSeries, OutOfPhaseADarkLineRunsAlongTheMuscle) {
+  const Torso torso(seed);
+  const auto fatsat = across_the_muscle(torso, made(torso, Series::fatsat, 1.8).image),
+             t1 = across_the_muscle(torso, made(torso, Series::t1, 1.8).image);
+  EXPECT_LT(fatsat[8], 0.95 * std::min(fatsat[2], fatsat[14]));
+  EXPECT_GT(t1[8], t1[2]);  // in phase the grey rises from muscle to fat
+  EXPECT_LT(t1[8], t1[14]);
+}
+
+TEST(MadeSeries, FatLiesBetweenSkinAndMuscle) {
+  for (std::uint64_t body = 31; body <= 36; ++body) {
+    const Torso torso(body);
+    for (double x = -110; x <= 110; x += 10) {
+      double y = -150, fat_mm = 0;
+      for (; torso.at({x, y, 0}) != phantom::Stuff::muscle && y < 150; y += 0.25)
+        fat_mm += torso.at({x, y, 0}) == phantom::Stuff::fat || torso.at({x, y, 0}) == phantom::Stuff::gland ? 0.25 : 0;
+      EXPECT_GT(fat_mm, 2) << body << " " << x;
+    }
+  }
+}
+
+TEST(MadeSeries, BreastAndGlandOfADrawnTorsoAreFoundWithFatSuppressed) {
+  const Torso torso(seed);
+  const MadeSeries series = made(torso, Series::fatsat, 1.6);
+  const auto result = run_recipe(series.image, read_shipped_recipe("fatsat_auto"));
+  const auto [breast, gland] = dice_of(torso, series, result.labels);
+  EXPECT_GT(breast, 0.93);
+  EXPECT_GT(gland, 0.6);
+}
+
 TEST(MadeSeries, BreastAndGlandOfADrawnTorsoAreFound) {
   const Torso torso(seed);
   const MadeSeries series = made(torso, Series::t1, 1.6);

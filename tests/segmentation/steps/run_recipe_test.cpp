@@ -163,5 +163,31 @@ TEST(FindBody, SpecksOfNoiseDoNotCloseTheAir) {
     }
 }
 
+TEST(FindBody, AirDoesNotRunAlongUnderTheSkin) {  // out of phase, a dark row parts bright skin from fat
+  GreyImage image;
+  image.grid.size = {60, 40, 20};
+  image.grid.spacing_mm = {1.2, 1.2, 3};
+  const auto hole = [](int i) { return i >= 25 && i < 35; };
+  for (int k = 0; k < 20; ++k)
+    for (int j = 0; j < 40; ++j)
+      for (int i = 0; i < 60; ++i)
+        image.voxels.push_back(j < 20 ? 5.0f : j < 22 ? (hole(i) ? 70.0f : 285.0f) : j == 22 ? 30.0f : 100.0f);
+  Body step;
+  step.lower = 50;
+  step.air = 34;
+  step.gap_mm = 4;
+  step.peel_mm = 8;
+  step.edge_share = 0.38f;
+  const Mask body = find_body(image, step);
+  for (int k = 0; k < 20; ++k)
+    for (int i = 0; i < 60; ++i) {
+      EXPECT_FALSE(body[image.grid.index(i, 15, k)]);
+      for (const int j : {20, 21, 22, 24}) {
+        if (i >= 20 && i < 40) continue;
+        EXPECT_TRUE(body[image.grid.index(i, j, k)]) << i << " " << j;
+      }
+    }
+}
+
 }  // namespace
 }  // namespace supine::segmentation
