@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // Made series of drawn torsos through the automatic recipes, against what they were made of.
-//   bench_mri_series t1|fatsat|t2|both FIRST COUNT [FOLDER]   a row per seed, then medians; the worst are drawn in
-//                                                             FOLDER; both: T1, the fat-suppressed one beside it
+//   bench_mri_series t1|fatsat|t2|both|second FIRST COUNT [FOLDER [GLAND]]
+//     a row per seed, then medians; the worst are drawn in FOLDER; both: T1, the fat-suppressed one beside it; second:
+//     the fat-suppressed one, T1 beside it; GLAND: a labelled breast whose gland they carry (breastPhantom)
 //   bench_mri_series planted SEED                        planted failures and what is said
 #include <fmt/format.h>
 
@@ -9,12 +10,15 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <memory>
 #include <optional>
 #include <random>
 #include <string>
 
 #include "common/error.h"
+#include "phantom/mri/anatomy.h"
 #include "phantom/mri/series.h"
+#include "segmentation/formats/image_io.h"
 #include "segmentation/label_map.h"
 #include "segmentation/overlay.h"
 #include "segmentation/steps/recipe_toml.h"
@@ -131,11 +135,11 @@ segmentation::RecipeResult segment(const segmentation::GreyImage& image, bool fa
                                   std::move(second));
 }
 
-/// The fat-suppressed series of the same visit: voxels, noise and ghosts of its own, and she has moved by some mm.
-segmentation::GreyImage beside(const phantom::Torso& torso, std::uint64_t seed) {
+/// Another series of the same visit: voxels, noise and ghosts of its own, and she has moved by some mm.
+segmentation::GreyImage beside(const phantom::Torso& torso, std::uint64_t seed, phantom::Series series) {
   constexpr std::uint64_t other_noise = 1000003;
   constexpr double most_mm = 3;
-  auto image = phantom::make_series(torso, seed + other_noise, {.series = phantom::Series::fatsat}).image;
+  auto image = phantom::make_series(torso, seed + other_noise, {.series = series}).image;
   std::mt19937_64 generator(seed);
   std::uniform_real_distribution<double> along(-most_mm, most_mm);
   for (double& mm : image.grid.origin_mm) mm += along(generator);
@@ -147,19 +151,29 @@ void draw(const phantom::MadeSeries& made, const segmentation::LabelImage& label
   segmentation::write_png(segmentation::overlay(labels, &made.image, 2, {}, places), file);
 }
 
-int table(phantom::Series series, bool both, std::uint64_t first, int count, const std::string& folder) {
+struct Wanted {
+  phantom::Series series = phantom::Series::t1;
+  std::optional<phantom::Series> second;
+  std::uint64_t first = 1, count = 1;
+  std::string folder;
+  std::shared_ptr<const phantom::Anatomy> gland;
+};
+
+int table(const Wanted& wanted) {
   std::vector<double> breast, gland, volume, wall, wall95, breast95, gland95;
   fmt::print(
       "| seed | breast Dice | HD95 mm | ml (true) | gland Dice | HD95 mm | ml (true), by share | wall median / 95 % mm "
       "| doubts |\n"
       "|---|---|---|---|---|---|---|---|---|\n");
   int failed = 0;
-  for (std::uint64_t seed = first; seed < first + static_cast<std::uint64_t>(count); ++seed) {
-    const phantom::Torso torso(seed);
-    const phantom::MadeSeries made = phantom::make_series(torso, seed, {.series = series});
+  for (std::uint64_t seed = wanted.first; seed < wanted.first + wanted.count; ++seed) {
+    phantom::Torso torso(seed);
+    if (wanted.gland) torso.carry(wanted.gland);
+    const phantom::MadeSeries made = phantom::make_series(torso, seed, {.series = wanted.series});
     try {
-      const auto result =
-          segment(made.image, series == phantom::Series::t1, both ? std::optional(beside(torso, seed)) : std::nullopt);
+      std::optional<segmentation::GreyImage> second;
+      if (wanted.second) second = beside(torso, seed, *wanted.second);
+      const auto result = segment(made.image, wanted.series == phantom::Series::t1, std::move(second));
       const Score s = score(torso, made, result);
       fmt::print(
           "| {} | {:.3f} | {:.1f} | {:.0f} ({:.0f}) | {:.3f} | {:.1f} | {:.0f} ({:.0f}), {:.0f} | {:.1f} / {:.1f} | {} "
@@ -173,14 +187,14 @@ int table(phantom::Series series, bool both, std::uint64_t first, int count, con
       wall.push_back(s.wall_median);
       wall95.push_back(s.wall_95);
       if (s.true_gland_ml > 0) volume.push_back(s.gland_ml / s.true_gland_ml);
-      if (!folder.empty() && (s.breast < 0.9 || s.gland < 0.6))
-        draw(made, result.labels, fmt::format("{}/{}.png", folder, seed));
+      if (!wanted.folder.empty() && (s.breast < 0.9 || s.gland < 0.6))
+        draw(made, result.labels, fmt::format("{}/{}.png", wanted.folder, seed));
     } catch (const InputError& error) {
       ++failed;
       fmt::print("| {} | refused: {} |\n", seed, error.what());
-      if (!folder.empty())
+      if (!wanted.folder.empty())
         draw(made, {made.truth.grid, std::vector<std::uint8_t>(made.truth.voxels.size(), 0)},
-             fmt::format("{}/{}_refused.png", folder, seed));
+             fmt::format("{}/{}_refused.png", wanted.folder, seed));
     }
     std::fflush(stdout);
   }
@@ -273,13 +287,18 @@ int planted(std::uint64_t seed) {
 int main(int argc, char** argv) {
   if (argc >= 3 && std::strcmp(argv[1], "planted") == 0) return planted(std::strtoull(argv[2], nullptr, 10));
   if (argc < 4) {
-    fmt::print(stderr, "bench_mri_series t1|fatsat|t2|both FIRST COUNT [FOLDER], or planted SEED\n");
+    fmt::print(stderr, "bench_mri_series t1|fatsat|t2|both|second FIRST COUNT [FOLDER [GLAND]], or planted SEED\n");
     return 2;
   }
+  using phantom::Series;
   const std::string kind = argv[1];
-  const bool both = kind == "both";
-  return table(kind == "t1" || both ? phantom::Series::t1
-               : kind == "t2"       ? phantom::Series::t2
-                                    : phantom::Series::fatsat,
-               both, std::strtoull(argv[2], nullptr, 10), std::atoi(argv[3]), argc > 4 ? argv[4] : "");
+  Wanted wanted;
+  wanted.first = std::strtoull(argv[2], nullptr, 10);
+  wanted.count = std::strtoull(argv[3], nullptr, 10);
+  wanted.series = kind == "t1" || kind == "both" ? Series::t1 : kind == "t2" ? Series::t2 : Series::fatsat;
+  if (kind == "both") wanted.second = Series::fatsat;
+  if (kind == "second") wanted.second = Series::t1;
+  if (argc > 4) wanted.folder = argv[4];
+  if (argc > 5) wanted.gland = std::make_shared<phantom::Anatomy>(segmentation::read_image(argv[5], "LPS").image);
+  return table(wanted);
 }

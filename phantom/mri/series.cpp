@@ -17,9 +17,10 @@ using Greys = std::array<double, stuff_count>;
 // series at 1.5 T (muscle 0.26 and 0.85 of fat, gland about 0.4 and 2.7 of it).
 constexpr Greys t1_greys{0, 1, 0.38, 0.42, 0.26, 0.3, 0.22, 0.07},
     fatsat_greys{0, 0.37, 1, 1.05, 0.32, 0.36, 0.8, 0.06}, t2_greys{0, 0.16, 0.75, 0.3, 0.14, 0.35, 1, 0.06};
+constexpr double collagen_grey = 0.05;  // hardly any signal
 constexpr double full_scale = 1000;
 constexpr int across = 2, along = 3;  // finer points a voxel
-constexpr int finer = 4;              // across, where fat and water cancel
+constexpr int finer = 4;              // across, where fat and water meet in a series that shows it
 constexpr double fat_shift_hz = 217;  // of fat against water at 1.5 T (3.4 ppm)
 constexpr double coil_mm = 70;        // of the sensitivity's decay
 
@@ -33,11 +34,12 @@ const Greys& greys_of(Series series) {
   return series == Series::t1 ? t1_greys : series == Series::fatsat ? fatsat_greys : t2_greys;
 }
 
-/// Of fat against water at the echo. A fast gradient echo with fat suppression (fatsat) comes before both are in phase
-/// again (4.6 ms); T1 is made in phase, a spin echo (t2) brings both back.
+/// Of fat against water at the echo. Of fast gradient echoes with fat suppression half are read before both are in
+/// phase again, half then, after 4.6 ms; T1 is made in phase, a spin echo (t2) brings both back.
 double draw_fat_phase(std::uint64_t seed, Series series) {
   Random random(seed, "echo");
-  return series == Series::fatsat ? 2 * std::numbers::pi * fat_shift_hz * random.uniform(1.4e-3, 2.7e-3) : 0;
+  const double early_s = random.uniform(1.4e-3, 2.7e-3);
+  return series == Series::fatsat && random.uniform() < 0.5 ? 2 * std::numbers::pi * fat_shift_hz * early_s : 0;
 }
 
 Spoiling draw(const Torso& torso, Random& random, std::uint64_t seed, const SeriesOptions& options) {
@@ -114,9 +116,12 @@ VoxelSample sample_voxel(const Torso& torso, const Spoiling& s, const SeriesOpti
                                                       (c + 0.5) / along - 0.5));
         const Stuff here = torso.at(p);
         ++sample.count[static_cast<int>(here)];
-        if (here != Stuff::fat) sample.water += greys[static_cast<int>(here)];
+        if ((here == Stuff::muscle || here == Stuff::fat) && torso.is_collagen(p))
+          sample.water += collagen_grey;
+        else if (here != Stuff::fat)
+          sample.water += greys[static_cast<int>(here)];
         const Vector3d from = p - Vector3d(s.shift_mm, 0, 0);
-        if (torso.at(from) == Stuff::fat)
+        if (torso.at(from) == Stuff::fat && !torso.is_collagen(from))
           sample.fat += greys[static_cast<int>(Stuff::fat)] * fat_gain(s, from, options.all_fails);
       }
   sample.points = across_points * across_points * along;
@@ -132,7 +137,7 @@ void sample_torso(const Torso& torso, const Spoiling& s, const SeriesOptions& op
       for (int i = 0; i < grid.size.x(); ++i) {
         const Vector3d middle = grid.point(Vector3d(i, j, k));
         VoxelSample sample = sample_voxel(torso, s, options, middle, grid.spacing_mm, across);
-        if (s.fat_phase != 0 && sample.is_mixed())
+        if (options.series == Series::fatsat && sample.is_mixed())
           sample = sample_voxel(torso, s, options, middle, grid.spacing_mm, finer);
         const std::size_t n = grid.index(i, j, k);
         made.image.voxels[n] = static_cast<float>(full_scale * sensitivity(s, middle) * sample.grey(s.fat_phase));

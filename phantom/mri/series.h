@@ -28,9 +28,9 @@ struct MadeSeries {
 };
 
 /// Makes the series of a torso: greys per tissue with partial volume (2 × 2 × 3 points a voxel), fat shifted along x by
-/// chemical shift and, in fatsat, out of phase with water (a dark line where both meet), the coil's sensitivity (two
-/// loops in front of the breasts), suppression that fails near the inner lower breast, ghosts of the moving chest along
-/// x, Rician noise.
+/// chemical shift and, in half of the fatsat series, out of phase with water (a dark line wherever both meet), the dark
+/// fascia on the muscle, the coil's sensitivity (two loops in front of the breasts), suppression that fails near the
+/// inner lower breast, ghosts of the moving chest along x, Rician noise.
 MadeSeries make_series(const Torso& torso, std::uint64_t seed, const SeriesOptions& options);
 
 }  // namespace supine::phantom

@@ -26,7 +26,7 @@ double distance_to_line(const Eigen::Vector3d& p, const Eigen::Vector3d& a, cons
 }  // namespace
 
 Torso::Torso(std::uint64_t seed) {
-  Random shape(seed, "torso"), inside(seed, "gland");
+  Random shape(seed, "torso"), inside(seed, "gland"), sheet(seed, "fascia");
   half_width_ = shape.uniform(130, 165);
   depth_ = shape.uniform(75, 95);
   power_ = shape.uniform(2, 2.8);
@@ -36,6 +36,7 @@ Torso::Torso(std::uint64_t seed) {
   fat_side_ = shape.uniform(15, 32);
   pectoral_mm_ = shape.uniform(7, 14);
   pectoral_x_ = shape.uniform(85, 110);
+  fascia_mm_ = sheet.uniform(0.3, 0.7);
   skin_mm_ = shape.uniform(1.5, 2.5);
   support_mm_ = shape.uniform(10, 25);
   const double radius = shape.uniform(50, 66), hang = shape.uniform(55, 130), share = inside.uniform();
@@ -99,6 +100,15 @@ double Torso::chest_y_mm(double x, double z) const {
   return std::max(oval - pectoral_mm_ * a, bare_skin_y_mm(x, z) + skin_mm_ + least_fat_mm);
 }
 
+bool Torso::is_collagen(const Eigen::Vector3d& p) const {
+  constexpr double aside_mm = 0.5, slanted = 8;  // along y the sheet is at most so many times as thick
+  const double deep = p.y() - chest_y_mm(p.x(), p.z());
+  if (deep < 0) return anatomy_ && part_at(p) == Anatomy::Part::ligament;
+  if (deep > slanted * fascia_mm_ || std::abs(p.x()) >= half_width_) return false;
+  const double slope = (chest_y_mm(p.x() + aside_mm, p.z()) - chest_y_mm(p.x() - aside_mm, p.z())) / (2 * aside_mm);
+  return deep < fascia_mm_ * std::hypot(1, slope);
+}
+
 double Torso::bare_skin_y_mm(double x, double z) const {
   const double half = half_width_ + fat_side_, across = std::min(0.9999, std::abs(x) / half);
   return front_y_ + tilt_ * z - fat_front_ +
@@ -142,11 +152,24 @@ double Torso::texture(const Eigen::Vector3d& p) const {
   return sum;
 }
 
+bool Torso::may_hold_gland(int side, const Eigen::Vector3d& p) const {
+  return in_breast(side, p, gland_under_skin_mm + skin_mm_) && p.y() <= chest_y_mm(p.x(), p.z()) - gland_over_chest_mm;
+}
+
+Anatomy::Part Torso::part_at(const Eigen::Vector3d& p) const {
+  const int side = p.x() > 0;
+  if (!may_hold_gland(side, p)) return Anatomy::Part::fat;
+  const DrawnBreast& b = breasts_[side];
+  const double ahead = (b.foot_mm.y() - p.y()) / b.hang_mm;
+  const Eigen::Vector2d across =
+      (Eigen::Vector2d(p.x() - b.foot_mm.x(), p.z() - b.foot_mm.z()) - ahead * b.lean_mm).cwiseQuotient(b.half_mm);
+  return anatomy_->at({side == 0 ? -across.x() : across.x(), across.y(), ahead});
+}
+
 bool Torso::is_gland(const Eigen::Vector3d& p) const {
   const int side = p.x() > 0;
   const DrawnBreast& b = breasts_[side];
-  if (!in_breast(side, p, gland_under_skin_mm + skin_mm_) || p.y() > chest_y_mm(p.x(), p.z()) - gland_over_chest_mm)
-    return false;
+  if (!may_hold_gland(side, p)) return false;
   const Eigen::Vector3d nipple = nipple_mm(side);
   double along = 0;
   for (const Eigen::Vector3d& end : ducts_[side])
@@ -179,7 +202,9 @@ Stuff Torso::at(const Eigen::Vector3d& p) const {
   }
   for (const Ball& node : nodes_)
     if ((p - node.middle).norm() < node.radius) return Stuff::vessel;
-  return is_gland(p) ? Stuff::gland : Stuff::fat;
+  if (!anatomy_) return is_gland(p) ? Stuff::gland : Stuff::fat;
+  const Anatomy::Part part = part_at(p);
+  return part == Anatomy::Part::gland ? Stuff::gland : part == Anatomy::Part::vessel ? Stuff::vessel : Stuff::fat;
 }
 
 }  // namespace supine::phantom

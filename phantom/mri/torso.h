@@ -4,8 +4,10 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "phantom/mri/anatomy.h"
 #include "segmentation/image.h"
 
 namespace supine::phantom {
@@ -33,6 +35,8 @@ class Torso {
   explicit Torso(std::uint64_t seed);
 
   Stuff at(const Eigen::Vector3d& point_mm) const;
+  /// Whether a point of muscle or fat is collagen: the thin fascia on the muscle's front, or a ligament of an anatomy.
+  bool is_collagen(const Eigen::Vector3d& point_mm) const;
   /// Depth y of the front of chest and pectoral muscle at (x, z).
   double chest_y_mm(double x, double z) const;
   const std::array<DrawnBreast, 2>& breasts() const { return breasts_; }  ///< right, left
@@ -42,6 +46,9 @@ class Torso {
   double high_z_mm() const;
   double back_y_mm() const { return back_y_mm_; }
 
+  /// Lets both breasts carry the inside of a labelled one, mirrored to their side, in place of the drawn gland.
+  void carry(std::shared_ptr<const Anatomy> anatomy) { anatomy_ = std::move(anatomy); }
+
   /// Takes a breast away (a mastectomy).
   void remove(int side) { breasts_[side].there = false; }
 
@@ -49,11 +56,14 @@ class Torso {
   double bare_skin_y_mm(double x, double z) const;
   bool in_breast(int side, const Eigen::Vector3d& p, double inward_mm) const;
   bool in_body(const Eigen::Vector3d& p, double inward_mm) const;
+  bool may_hold_gland(int side, const Eigen::Vector3d& p) const;
+  Anatomy::Part part_at(const Eigen::Vector3d& p) const;
   bool is_gland(const Eigen::Vector3d& p) const;
   double texture(const Eigen::Vector3d& p) const;
 
   double half_width_ = 150, depth_ = 85, power_ = 2.3, front_y_ = 25, tilt_ = 0, fat_front_ = 12, fat_side_ = 25,
-         pectoral_mm_ = 10, pectoral_x_ = 95, skin_mm_ = 2, back_y_mm_ = 60, support_z_ = -70, support_mm_ = 20;
+         pectoral_mm_ = 10, pectoral_x_ = 95, fascia_mm_ = 0.5, skin_mm_ = 2, back_y_mm_ = 60, support_z_ = -70,
+         support_mm_ = 20;
   std::array<DrawnBreast, 2> breasts_;
   struct Ball {
     Eigen::Vector3d middle;
@@ -62,6 +72,7 @@ class Torso {
   std::vector<Ball> nodes_;
   std::array<std::vector<Eigen::Vector3d>, 2> ducts_;  // ends of the fan's strands
   segmentation::GreyImage texture_;                    // a smooth random field, mean 0, sd 1
+  std::shared_ptr<const Anatomy> anatomy_;
 };
 
 }  // namespace supine::phantom

@@ -5,8 +5,10 @@
 #include <fmt/ranges.h>
 
 #include "common/error.h"
+#include "phantom/mri/anatomy.h"
 #include "phantom/mri/series.h"
 #include "pipeline/tool/tool.h"
+#include "segmentation/formats/image_io.h"
 
 namespace supine::pipeline {
 namespace {
@@ -32,6 +34,7 @@ class PhantomTool : public Tool {
            "  supine-phantom --realistic --effect ligament --effect adhesion --seed 3 -o trials/case-010\n"
            "  supine-phantom --prior --seed 4 --tilt -o trials/case-011\n"
            "  supine-phantom --mri fatsat --seed 5 -o trials/mri-005\n"
+           "  supine-phantom --mri t1 --seed 5 --gland breastphantom_fatty_0p5mm.nrrd -o trials/mri-006\n"
            "  supine-phantom --outside coil_contact --seed 9 -o trials/case-009 --answer sealed/9.json\n";
   }
 
@@ -67,12 +70,16 @@ class PhantomTool : public Tool {
                    "instead: a made MRI series of a drawn torso with both breasts: t1, fatsat, t2 (with fat "
                    "suppression); the answer is a label volume, answers/NAME.nrrd")
         ->check(CLI::IsMember({"t1", "fatsat", "t2"}));
+    app.add_option("--gland", gland_,
+                   "with --mri: a labelled breast (breastPhantom, x from chest to nipple) whose gland, vessels and "
+                   "ligaments both breasts carry; default: drawn");
     app.add_option("--answer", answer_, "file of the answer, outside the case folder (.json)");
   }
 
   Outcome run(Run& run) override {
     const fs::path folder = case_folder();
     if (!series_.empty()) return make_series(folder, run);
+    if (!gland_.empty()) throw InputError("--gland goes with --mri: computed breasts have a gland of their own");
     const fs::path answer = answer_file(folder);
     take_effects();
     options_.population = populations.at(population_);
@@ -99,14 +106,16 @@ class PhantomTool : public Tool {
     if (!effects_.empty() || !options_.outside.empty() || options_.prior || options_.realistic || options_.tilt ||
         !answer_.empty())
       throw InputError(
-          "--mri makes a series of a drawn torso, which has no effects, poses or scans: only --seed and -o go with it");
+          "--mri makes a series of a drawn torso, which has no effects, poses or scans: only --seed, --gland and -o go "
+          "with it");
     const auto series = series_ == "t1"   ? phantom::Series::t1
                         : series_ == "t2" ? phantom::Series::t2
                                           : phantom::Series::fatsat;
     const fs::path truth = folder.parent_path() / "answers" / (folder.filename().string() + ".nrrd");
     run.stage("make");
     run.progress("drawing the torso and its series");
-    const phantom::Torso torso(options_.seed);
+    phantom::Torso torso(options_.seed);
+    if (!gland_.empty()) torso.carry(read_anatomy(run));
     const phantom::MadeSeries made = phantom::make_series(torso, options_.seed, {.series = series});
     run.stage("write");
     Outputs outputs(run.force());
@@ -116,6 +125,15 @@ class PhantomTool : public Tool {
     run.say(fmt::format("{}: {} x {} x {} voxels; what it was made of is in {}", folder.string(), size.x(), size.y(),
                         size.z(), truth.string()));
     return Outcome::done;
+  }
+
+  std::shared_ptr<const phantom::Anatomy> read_anatomy(Run& run) const {
+    try {
+      // Its axes are its own: no frame says where its chest is.
+      return std::make_shared<phantom::Anatomy>(segmentation::read_image(run.input(gland_), "LPS").image);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("--gland {}: {}", gland_.string(), error.what()));
+    }
   }
 
   fs::path case_folder() const {
@@ -247,7 +265,7 @@ class PhantomTool : public Tool {
   phantom::PhantomOptions options_;
   std::string population_ = "benchmark", series_;
   std::vector<std::string> effects_;
-  fs::path answer_;
+  fs::path answer_, gland_;
 };
 
 }  // namespace

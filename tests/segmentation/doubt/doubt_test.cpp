@@ -79,6 +79,53 @@ TEST(MadeSeries, FatLiesBetweenSkinAndMuscle) {
   }
 }
 
+/// A half ball on a plate of muscle: a block of gland toward the head, on the side of +y, and a ligament over it.
+GreyImage labelled_breast() {
+  GreyImage labels;
+  labels.grid.size = {46, 81, 81};
+  labels.grid.origin_mm = {-5, -40, -40};
+  for (int k = 0; k < 81; ++k)
+    for (int j = 0; j < 81; ++j)
+      for (int i = 0; i < 46; ++i) {
+        const Eigen::Vector3d p = labels.grid.point(Eigen::Vector3d(i, j, k));
+        float label = p.norm() < 40 && p.x() > 0 ? 1 : 0;
+        if (p.x() <= 0 && std::hypot(p.y(), p.z()) < 40) label = 40;
+        if (p.x() > 8 && p.x() < 24 && p.y() > 4 && p.y() < 20 && p.z() > 4 && p.z() < 20) label = p.z() < 17 ? 29 : 88;
+        labels.voxels.push_back(label);
+      }
+  return labels;
+}
+
+TEST(Anatomy, LiesInTheDrawnBreastWhereItLiesInItsOwn) {
+  Torso torso(seed);
+  torso.carry(std::make_shared<phantom::Anatomy>(labelled_breast()));
+  for (const int side : {0, 1}) {
+    const phantom::DrawnBreast& b = torso.breasts()[side];
+    const auto at = [&](double across, double up, double ahead) {
+      return Eigen::Vector3d(b.foot_mm.x() + (side == 0 ? -1 : 1) * across * b.half_mm.x() + ahead * b.lean_mm.x(),
+                             b.foot_mm.y() - ahead * b.hang_mm,
+                             b.foot_mm.z() + up * b.half_mm.y() + ahead * b.lean_mm.y());
+    };
+    EXPECT_EQ(torso.at(at(0.3, 0.25, 0.4)), phantom::Stuff::gland) << side;  // outward on either side
+    EXPECT_EQ(torso.at(at(-0.3, 0.25, 0.4)), phantom::Stuff::fat) << side;
+    EXPECT_EQ(torso.at(at(0.3, -0.25, 0.4)), phantom::Stuff::fat) << side;
+    EXPECT_EQ(torso.at(at(0.3, 0.25, 0.8)), phantom::Stuff::fat) << side;
+    EXPECT_TRUE(torso.is_collagen(at(0.3, 0.46, 0.4))) << side;
+    EXPECT_FALSE(torso.is_collagen(at(-0.3, 0.46, 0.4))) << side;
+  }
+}
+
+TEST(Anatomy, RefusesWhatIsNoLabelledBreast) {
+  GreyImage other = labelled_breast(), fatty = other;
+  other.voxels[7] = 3;
+  for (float& label : fatty.voxels) label = label == 29 ? 1 : label;
+  const auto said = [](const GreyImage& labels) {
+    return testing::message_of([&] { phantom::Anatomy anatomy(labels); });
+  };
+  EXPECT_NE(said(other).find("value 3 is no label"), std::string::npos);
+  EXPECT_NE(said(fatty).find("no voxel is gland (label 29)"), std::string::npos);
+}
+
 TEST(MadeSeries, BreastAndGlandOfADrawnTorsoAreFoundWithFatSuppressed) {
   const Torso torso(seed);
   const MadeSeries series = made(torso, Series::fatsat, 1.6);
