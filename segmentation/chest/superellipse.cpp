@@ -9,16 +9,18 @@ namespace supine::segmentation {
 namespace {
 
 constexpr double plate_begins_mm = 6, plate_rises_mm = 12;  // beside the sternum; it thins as far at the outer edge
+constexpr double plate_thins_mm = 25;                       // toward its lower end
 constexpr double thickest_plate_mm = 15, roundest = 1.8, squarest = 4;
 
 /// What the plate adds along a ray whose bare end is at `bare`.
-double plate_radius_mm(const Superellipse& shape, double angle_rad, double bare) {
+double plate_radius_mm(const Superellipse& shape, double angle_rad, double z_mm, double bare) {
   const double ahead = std::cos(angle_rad);
-  if (ahead < 0.2) return 0;
+  const double here = shape.plate_mm * std::clamp(0.5 + (z_mm - shape.plate_low_mm) / plate_thins_mm, 0.0, 1.0);
+  if (ahead < 0.2 || here == 0) return 0;
   double more = 0;
   for (int n = 0; n < 3; ++n) {  // the plate is as thick as it is where the ray leaves it
     const double x = (bare + more) * std::abs(std::sin(angle_rad));
-    more = shape.plate_mm / ahead * std::clamp((x - plate_begins_mm) / plate_rises_mm, 0.0, 1.0) *
+    more = here / ahead * std::clamp((x - plate_begins_mm) / plate_rises_mm, 0.0, 1.0) *
            std::clamp((shape.plate_edge_mm - x) / plate_rises_mm, 0.0, 1.0);
   }
   return more;
@@ -32,7 +34,7 @@ double Superellipse::radius_mm(double angle_rad, double z_mm) const {
   const double across = std::abs(std::sin(angle_rad)) / half_width_mm,
                ahead = std::max(0.0, std::cos(angle_rad)) / std::max(10.0, depth);
   const double bare = std::pow(std::pow(across, power) + std::pow(ahead, power), -1 / power);
-  return plate_mm > 0 ? bare + plate_radius_mm(*this, angle_rad, bare) : bare;
+  return plate_mm > 0 ? bare + plate_radius_mm(*this, angle_rad, z_mm, bare) : bare;
 }
 
 namespace {
@@ -72,6 +74,7 @@ Scored polished(Scored best, const Widths& widths, const Cost& cost) {
   if (best.shape.plate_mm > 0) {
     steps.emplace_back(&Superellipse::plate_mm, 2);
     steps.emplace_back(&Superellipse::plate_edge_mm, 4);
+    steps.emplace_back(&Superellipse::plate_low_mm, 6);
   }
   for (double share = 1; share > 0.2;) {
     bool better = false;
@@ -107,14 +110,16 @@ std::vector<Superellipse> with_plates(const Superellipse& bare) {
   for (const double thickness : {5.0, 9.0, 13.0})
     for (const double edge : {80.0, 90.0, 100.0, 110.0})
       for (const double deeper : {0.0, 0.5, 1.0})
-        for (const double rounder : {0.0, 0.5, 1.0}) {
-          Superellipse shape = bare;
-          shape.power = std::max(roundest, shape.power - rounder);
-          shape.depth_mm -= deeper * thickness;
-          shape.plate_mm = thickness;
-          shape.plate_edge_mm = edge;
-          shapes.push_back(shape);
-        }
+        for (const double rounder : {0.0, 0.5, 1.0})
+          for (const double low_mm : {300.0, 70.0, 50.0, 30.0}) {  // under the middle level
+            Superellipse shape = bare;
+            shape.power = std::max(roundest, shape.power - rounder);
+            shape.depth_mm -= deeper * thickness;
+            shape.plate_mm = thickness;
+            shape.plate_edge_mm = edge;
+            shape.plate_low_mm = shape.middle_z_mm - low_mm;
+            shapes.push_back(shape);
+          }
   return shapes;
 }
 

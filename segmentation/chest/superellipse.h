@@ -15,8 +15,9 @@ struct Superellipse {
   double depth_slope = 0;  ///< d depth / dz
   double power = 2.5;
   double middle_z_mm = 0;
-  double plate_mm = 0;        ///< thickness of the muscle, toward the front; >= 0
-  double plate_edge_mm = 95;  ///< of its outer edge from the middle line
+  double plate_mm = 0;         ///< thickness of the muscle, toward the front; >= 0
+  double plate_edge_mm = 95;   ///< of its outer edge from the middle line
+  double plate_low_mm = -300;  ///< level z at which its lower end is half as thick
 
   double radius_mm(double angle_rad, double z_mm) const;
 };
