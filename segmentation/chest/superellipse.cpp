@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "segmentation/chest/superellipse.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>

@@ -69,26 +69,29 @@ std::vector<float> local_maximum(const GreyImage& image, double radius_mm) {
   return field;
 }
 
-/// Whether the straight way from a voxel down the distance to sure air leads through the skin: at least behind_mm of it
-/// is no air.
+/// The neighbour down the steepest fall of the distance, or the voxel itself where none falls.
+Eigen::Vector3i nearer(const Grid& grid, const std::vector<float>& squared_mm2, const Eigen::Vector3i& at) {
+  const auto distance_mm = [&](const Eigen::Vector3i& n) {
+    return std::sqrt(squared_mm2[grid.index(n.x(), n.y(), n.z())]);
+  };
+  Eigen::Vector3i best = at;
+  double steepest = 0;
+  for (int n = 0; n < 27; ++n) {
+    const Eigen::Vector3i step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1), to = at + step;
+    if (step.isZero() || !grid.contains(to.x(), to.y(), to.z())) continue;
+    const double fall = (distance_mm(at) - distance_mm(to)) / step.cast<double>().cwiseProduct(grid.spacing_mm).norm();
+    if (fall <= steepest) continue;
+    steepest = fall;
+    best = to;
+  }
+  return best;
+}
+
+/// Whether the straight way from a voxel to sure air leads through the skin: at least behind_mm of it is no air.
 bool lies_behind_skin(const Grid& grid, const std::vector<float>& squared_mm2, const Mask& air, Eigen::Vector3i at) {
   double solid_mm = 0;
   while (squared_mm2[grid.index(at.x(), at.y(), at.z())] > 0) {
-    Eigen::Vector3i next = at;
-    double steepest = 0;
-    const double here = std::sqrt(squared_mm2[grid.index(at.x(), at.y(), at.z())]);
-    for (int c = -1; c <= 1; ++c)
-      for (int b = -1; b <= 1; ++b)
-        for (int a = -1; a <= 1; ++a) {
-          const Eigen::Vector3i to = at + Eigen::Vector3i(a, b, c);
-          if (to == at || !grid.contains(to.x(), to.y(), to.z())) continue;
-          const double fall = (here - std::sqrt(squared_mm2[grid.index(to.x(), to.y(), to.z())])) /
-                              Eigen::Vector3d(a, b, c).cwiseProduct(grid.spacing_mm).norm();
-          if (fall > steepest) {
-            steepest = fall;
-            next = to;
-          }
-        }
+    const Eigen::Vector3i next = nearer(grid, squared_mm2, at);
     if (next == at) return false;
     if (!air[grid.index(next.x(), next.y(), next.z())])
       solid_mm += (next - at).cast<double>().cwiseProduct(grid.spacing_mm).norm();

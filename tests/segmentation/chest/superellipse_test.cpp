@@ -42,6 +42,10 @@ TEST(Superellipse, PlateStandsOutToTheFrontBetweenItsEdges) {
   EXPECT_DOUBLE_EQ(more(0.5), more(-0.5));
   EXPECT_DOUBLE_EQ(more(1.3), 0);
   EXPECT_DOUBLE_EQ(more(3), 0);
+  plated.plate_low_mm = 30;
+  EXPECT_NEAR(more(0.5) * std::cos(0.5), 6, 1e-9);
+  plated.plate_low_mm = 50;
+  EXPECT_DOUBLE_EQ(more(0.5), 0);
 }
 
 TEST(Superellipse, ChestsWithAndWithoutMusclesAreFound) {
