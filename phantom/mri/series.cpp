@@ -94,7 +94,7 @@ segmentation::Grid draw_grid(const Torso& torso, Random& random, const SeriesOpt
   return grid;
 }
 
-/// What finer points of a voxel hold, means over them.
+/// Sums over the finer points of a voxel.
 struct VoxelSample {
   std::array<int, stuff_count> count{};
   double water = 0, fat = 0, points = 0;
