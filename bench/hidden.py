@@ -55,7 +55,8 @@ def make_case(work, binaries, name, options):
 def state_registration(case, registration_mm):
     """Scans of the mixture lie where they are said to; the case tells the tools how well that is known."""
     file = case / "case.toml"
-    file.write_text(re.sub(r'(?m)^surface = .*$', rf"\g<0>\nregistration_mm = {registration_mm}", file.read_text()))
+    silent = re.sub(r"(?m)^registration_mm = .*\n", "", file.read_text())
+    file.write_text(re.sub(r"(?m)^surface = .*$", rf"\g<0>\nregistration_mm = {registration_mm}", silent))
 
 
 def note_seconds(out, seconds):
@@ -118,9 +119,8 @@ def one_case(work, options, name, words):
         diagnose_again(work, options.bin, name, options.label, not options.no_tilt)
     else:
         words = words + ([] if options.no_tilt else ["--tilt"])
-        fresh = not (work / "answers" / f"{name}.json").exists()
         made, seconds = make_case(work, options.bin, name, words)
-        if made and fresh and options.registration_mm is not None:
+        if made and options.registration_mm is not None:
             state_registration(work / "cases" / name, options.registration_mm)
         if made:
             (out / name).mkdir(parents=True, exist_ok=True)
@@ -195,6 +195,8 @@ def arguments(words=None):
                        (options.prior and options.realistic,
                         "--prior excludes --realistic: each says how nuisances are drawn"),
                        (options.seed is not None and options.seed_from, "--seed excludes --seed-from"),
+                       (options.registration_mm is not None and options.again,
+                        "--registration-mm excludes --again: the cases are there and say what they say"),
                        (options.first < 1, f"--first {options.first}: cases are counted from 1")):
         if both:
             raise SystemExit(what)

@@ -73,6 +73,12 @@ void Anatomy::measure() {
   each([&](std::uint8_t, const Vector3d& p) {
     if (p.x() >= chest && p.x() <= chest + foot_mm) foot.add(p);
   });
+  if (!foot.low.allFinite() || !(breast.high.x() > chest + foot_mm))
+    throw InputError(
+        fmt::format("no breast lies in front of the muscle (which ends at x = {:.1f} mm, all else at {:.1f} mm): x "
+                    "must lead from the "
+                    "chest wall to the nipple",
+                    chest, breast.high.x()));
   foot_mm_ = (foot.low + foot.high) / 2;
   foot_mm_.x() = chest;
   half_mm_ = (foot.high - foot.low) / 2;

@@ -16,7 +16,7 @@ class Anatomy {
   /// @param labels  of the breastPhantom family (github.com/DIDSR/breastPhantom): fat 1, skin 2, gland 29, nipple 33,
   /// muscle 40, Cooper's ligament 88, TDLU 95, duct 125, artery 150, vein 225; x from the chest wall to the nipple, y
   /// across, z to the head
-  /// @throws InputError  other labels, or no gland among them
+  /// @throws InputError  other labels, no gland among them, or nothing in front of the muscle (x the other way round)
   explicit Anatomy(const segmentation::GreyImage& labels);
 
   /// @param place  across and toward the head as shares of the foot's half widths (-1 to 1), ahead as the share of the

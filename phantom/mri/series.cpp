@@ -44,7 +44,7 @@ double draw_fat_phase(std::uint64_t seed, Series series) {
 
 Spoiling draw(const Torso& torso, Random& random, std::uint64_t seed, const SeriesOptions& options) {
   Spoiling s;
-  s.fat_phase = draw_fat_phase(seed, options.series);
+  s.fat_phase = options.fat_phase_rad.value_or(draw_fat_phase(seed, options.series));
   const bool fat = options.series != Series::t1;
   s.noise = full_scale * (fat ? random.uniform(0.02, 0.05) : random.uniform(0.008, 0.02));
   s.shift_mm = random.uniform(0, 2);

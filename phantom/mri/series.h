@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "phantom/mri/torso.h"
 
@@ -15,9 +16,11 @@ struct SeriesOptions {
   Series series = Series::t1;
   Eigen::Vector3d voxel_mm = Eigen::Vector3d::Zero();  ///< 0 = drawn: 1.1 to 1.5 across, 2 to 4 along the body
   bool suppression_fails = true;                       ///< in one or two places (fatsat, t2); false = nowhere
-  bool all_fails = false;                              ///< nothing is suppressed
-  bool inverted = false;                               ///< a negative of the series
-  bool upside_down = false;                            ///< y turned round
+  std::optional<double> fat_phase_rad =
+      std::nullopt;          ///< of fat against water at the echo; absent: drawn (fatsat), else 0
+  bool all_fails = false;    ///< nothing is suppressed
+  bool inverted = false;     ///< a negative of the series
+  bool upside_down = false;  ///< y turned round
 };
 
 /// A made series and what it was made of, on one grid.

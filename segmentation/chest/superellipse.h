@@ -31,6 +31,7 @@ Superellipse best_superellipse(const std::function<double(const Superellipse&)>&
 
 /// The best of narrow, middling and wide chests, each with or without plates of up to 15 mm: where the sides are hardly
 /// seen, which of them is right shows only along the border itself.
+/// @param cost, centre_depth_mm, middle_z_mm  as for best_superellipse
 std::vector<Superellipse> superellipses_with_plates(const std::function<double(const Superellipse&)>& cost,
                                                     double centre_depth_mm, double middle_z_mm);
 

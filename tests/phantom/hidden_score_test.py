@@ -511,7 +511,8 @@ class StatedRegistration(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             case = pathlib.Path(folder)
             (case / "case.toml").write_text(CASE)
-            hidden.state_registration(case, 0.3)
+            for value in (2, 0.3):  # a call that goes on states it again
+                hidden.state_registration(case, value)
             stated = (case / "case.toml").read_text()
             self.assertEqual(stated.replace("registration_mm = 0.3\n", ""), CASE)
             poses = stated.split("[pose.")[1:]

@@ -2,6 +2,9 @@
 // Made series of a drawn torso through the automatic recipes: what is found, and what is refused or doubted.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <numbers>
+
 #include "phantom/mri/series.h"
 #include "segmentation/steps/recipe_toml.h"
 #include "segmentation/steps/run_recipe.h"
@@ -58,11 +61,24 @@ std::vector<double> across_the_muscle(const Torso& torso, const GreyImage& image
   return sum;
 }
 
-TEST(MadeSeries, OutOfPhaseADarkLineRunsAlongTheMuscle) {
+/// Grey on the front of the muscle over the darker of what lies 6 mm to either side.
+double line_of(const Torso& torso, const phantom::SeriesOptions& options) {
+  const auto grey = across_the_muscle(torso, phantom::make_series(torso, seed, options).image);
+  return grey[8] / std::min(grey[2], grey[14]);
+}
+
+TEST(MadeSeries, OutOfPhaseADarkLineRunsAlongTheMuscleAndInPhaseAFaintOne) {
   const Torso torso(seed);
-  const auto fatsat = across_the_muscle(torso, made(torso, Series::fatsat, 1.8).image),
-             t1 = across_the_muscle(torso, made(torso, Series::t1, 1.8).image);
-  EXPECT_LT(fatsat[8], 0.95 * std::min(fatsat[2], fatsat[14]));
+  phantom::SeriesOptions options{.series = Series::fatsat, .voxel_mm = {1.8, 1.8, 4}};
+  options.fat_phase_rad = 0;
+  const double in_phase = line_of(torso, options);
+  options.fat_phase_rad = std::numbers::pi;
+  const double opposed = line_of(torso, options);
+  EXPECT_GT(in_phase, 0.95);  // without fascia the mean of muscle and fat, 1.08 of muscle
+  EXPECT_LT(in_phase, 1.07);
+  EXPECT_GT(opposed, 0.6);
+  EXPECT_LT(opposed, 0.85);
+  const auto t1 = across_the_muscle(torso, made(torso, Series::t1, 1.8).image);
   EXPECT_GT(t1[8], t1[2]);  // in phase the grey rises from muscle to fat
   EXPECT_LT(t1[8], t1[14]);
 }
@@ -124,6 +140,9 @@ TEST(Anatomy, RefusesWhatIsNoLabelledBreast) {
   };
   EXPECT_NE(said(other).find("value 3 is no label"), std::string::npos);
   EXPECT_NE(said(fatty).find("no voxel is gland (label 29)"), std::string::npos);
+  GreyImage turned = labelled_breast();  // x from the nipple to the chest
+  std::reverse(turned.voxels.begin(), turned.voxels.end());
+  EXPECT_NE(said(turned).find("no breast lies in front of the muscle"), std::string::npos) << said(turned);
 }
 
 TEST(MadeSeries, BreastAndGlandOfADrawnTorsoAreFoundWithFatSuppressed) {
