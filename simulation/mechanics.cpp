@@ -15,6 +15,7 @@
 #include "simulation/terms/gravity.h"
 #include "simulation/terms/interface.h"
 #include "simulation/terms/skin.h"
+#include "simulation/terms/skin_end_fade.h"
 #include "simulation/terms/support.h"
 #include "simulation/terms/traction.h"
 
@@ -37,7 +38,8 @@ std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, cons
       std::make_unique<GravityTerm<Cell>>(mesh.cells, pattern, mesh.points, model.breast.density_refers_to));
   if (model.skin.young_modulus_kpa.value > 0)
     terms.push_back(std::make_unique<SkinTerm<MembraneFace<Face>>>(
-        rows_of(mesh.faces, layout.skin.faces), pattern, SkinSettings{model.skin.law, model.skin.compression}));
+        rows_of(mesh.faces, layout.skin.faces), pattern, SkinSettings{model.skin.law, model.skin.compression},
+        fade_from_skin_end<MembraneFace<Face>>(mesh, layout.skin.faces, model.skin.fade_mm)));
   terms.push_back(std::make_unique<TractionTerm<Face>>(rows_of(mesh.faces, layout.skin.faces), pattern));
   for (std::size_t s = 0; s < layout.support_begin.size() - 1; ++s) {
     const int first = layout.support_begin[s], count = layout.support_begin[s + 1] - first;
@@ -49,7 +51,9 @@ std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, cons
       terms.push_back(std::make_unique<SupportTerm<Face>>(faces, pattern, mesh.points, first * Face::points));
   }
   if (model.cut.kind == CutKind::elastic)
-    terms.push_back(std::make_unique<CutTerm<Face>>(rows_of(mesh.faces, layout.cut.faces), pattern));
+    terms.push_back(
+        std::make_unique<CutTerm<Face>>(rows_of(mesh.faces, layout.cut.faces), pattern,
+                                        fade_from_skin_end<Face>(mesh, layout.cut.faces, model.skin.fade_mm)));
   return terms;
 }
 

@@ -76,6 +76,9 @@ struct Model {
     Compression compression = Compression::tension_field;
     Setting compression_share{0.05};
     Setting poisson_ratio{0.45};  ///< corotational skin only
+    /// Skin and cut fade over so much where the skin ends, mm, >= 0 (terms/skin_end_fade.h); 0: at full stiffness up to
+    /// it. What the body goes on with, no belief, so it is not calibrated.
+    double fade_mm = 0;
   } skin;
   struct {
     InterfaceKind kind = InterfaceKind::sliding;

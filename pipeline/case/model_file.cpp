@@ -135,6 +135,7 @@ void read_choices(const TomlReader& file, Model& model) {
   read_choice<InterfaceKind>(file.sub_table("interface"), "kind", interface_kinds(), model.interface.kind);
   read_choice<CutKind>(file.sub_table("cut"), "kind", {{"elastic", CutKind::elastic}, {"held", CutKind::held}},
                        model.cut.kind);
+  if (skin) model.skin.fade_mm = skin->number("fade_mm", {.lower = 0, .upper = 50}).value_or(0);
 }
 
 /// "section" and "key" of a base row.
@@ -145,7 +146,7 @@ std::pair<std::string, std::string> split_name(const std::string& name) {
 
 void check_base_keys(const TomlReader& file) {
   std::map<std::string, std::vector<std::string>> known = {{"breast", {"law", "density_refers_to", "volumetric"}},
-                                                           {"skin", {"law", "compression"}},
+                                                           {"skin", {"law", "compression", "fade_mm"}},
                                                            {"interface", {"kind"}},
                                                            {"cut", {"kind"}}};
   for (const Parameter& row : simulation::base_parameters()) {

@@ -65,7 +65,8 @@ double left_with(const AroundGland& around, const GreyImage& share, const Eigen:
   return fields.left();
 }
 
-/// The axes along which voxels are short: along thick slices nothing is read out by frequency.
+}  // namespace
+
 std::vector<int> axes_of_slices(const Grid& grid) {
   constexpr double thick = 1.5;
   std::vector<int> axes;
@@ -73,8 +74,6 @@ std::vector<int> axes_of_slices(const Grid& grid) {
     if (grid.spacing_mm[a] < thick * grid.spacing_mm.minCoeff()) axes.push_back(a);
   return axes;
 }
-
-}  // namespace
 
 FatShift find_fat_shift(const GreyImage& image, const std::vector<float>& share, const Mask& within) {
   constexpr double least_gain = 0.08, step_mm = 0.5;

@@ -22,6 +22,9 @@ struct FatShift {
 /// @param within  where f is known
 FatShift find_fat_shift(const GreyImage& image, const std::vector<float>& share, const Mask& within);
 
+/// The axes along which voxels are short: along thick slices nothing is read out by frequency.
+std::vector<int> axes_of_slices(const Grid& grid);
+
 /// What stands at x + @p shift_mm, at x; unusable where that is beyond the image.
 SeriesContrast moved(const SeriesContrast& contrast, const Grid& grid, const Eigen::Vector3d& shift_mm);
 

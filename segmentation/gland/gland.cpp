@@ -8,6 +8,7 @@
 #include "segmentation/gland/fat_shift.h"
 #include "segmentation/gland/gland_outline.h"
 #include "segmentation/gland/gland_place.h"
+#include "segmentation/gland/moved_fat.h"
 #include "segmentation/gland/second_series.h"
 #include "segmentation/gland/tissue_classes.h"
 
@@ -77,6 +78,15 @@ SeriesContrast take_together(const GreyImage& image, const SeriesContrast& first
   return moved(both, image.grid, shift.laid_mm + shift.fat_mm);
 }
 
+/// Gland where it is, in a series whose fat lies aside. @return by how much, where that is told
+std::optional<Eigen::Vector3d> put_back(const Grid& grid, SeriesContrast& series) {
+  const std::optional<MovedFat> moved = find_moved_fat(series.fat.contrast, series.usable, grid, series.pure);
+  if (!moved) return {};
+  for (std::size_t n = 0; n < series.usable.size(); ++n)
+    if (series.usable[n]) series.fat.contrast[n] = static_cast<float>(series.pure) * moved->share[n];
+  return moved->fat_mm;
+}
+
 void note_shading(const FatLevel& fat, const Mask& inner, GlandResult& result) {
   for (std::size_t n = 0; n < inner.size(); ++n)
     if (inner[n]) {
@@ -106,7 +116,8 @@ GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const Gl
     series = take_together(image, series, contrast_in(laid.image, inner, under_skin, *options.second, options),
                            options.contrast, *result.second);
     for (std::size_t n = 0; n < inner.size(); ++n) series.usable[n] = series.usable[n] && inner[n];
-  }
+  } else if (options.contrast == GlandOptions::Contrast::dark)
+    result.fat_shift_mm = put_back(grid, series);
   result.failed_ml = volume_ml(inner, grid) - volume_ml(series.usable, grid);
   inner = std::move(series.usable);
   const FatLevel& fat = series.fat;

@@ -44,8 +44,9 @@ struct GlandResult {
   std::vector<float> fraction;  ///< of gland, 0 to 1 per voxel, 0 outside the breast; gland is where it is likely
   double fat_sd = 0;            ///< of the fat's contrast, in its own grey (0.1 = 10 %), the median over the breast
   double pure = 0;              ///< contrast of pure gland: 0.7 = 70 % darker, or brighter, than fat
-  double shading_low = 1, shading_high = 1;  ///< that was taken off, relative to its median
-  double failed_ml = 0;                      ///< of breast where suppression failed
+  double shading_low = 1, shading_high = 1;     ///< that was taken off, relative to its median
+  double failed_ml = 0;                         ///< of breast where suppression failed
+  std::optional<Eigen::Vector3d> fat_shift_mm;  ///< by which fat lies aside, told from the one series (moved_fat.h)
   double aside_ml = 0;  ///< that look like gland but lie elsewhere than gland does: vessels, axilla, islands
   /// Of the second series: where the same tissue lies in it, how far fat lies aside in the first (second_series.h), its
   /// fat's scatter and its contrast of pure gland.
@@ -65,6 +66,7 @@ struct GlandResult {
 ///    gland.
 /// 3. Place: not in skin, chest or failed suppression; inside the fan from the nipple to the chest; no small islands.
 /// 4. Labelled is what a reader outlines around it (outline_gland); the share is not that of the filled gaps.
+/// In one dark series whose fat the scanner moved, 2 begins with the share of gland where it is (moved_fat.h).
 /// With a second series 1 is done for each by itself, and the shares they say are taken together (share_by_both); where
 /// suppression failed in one of them the other speaks alone.
 /// @param second  of the same body, in greys of its own, on any grid; null without options.second

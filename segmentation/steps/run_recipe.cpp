@@ -271,6 +271,9 @@ std::string StepRunner::run(const Planes& step) {
 }
 
 std::string second_words(const GlandResult& result) {
+  if (result.fat_shift_mm)
+    return fmt::format("; fat lies ({:.1f}, {:.1f}, {:.1f}) mm aside, gland was put back", result.fat_shift_mm->x(),
+                       result.fat_shift_mm->y(), result.fat_shift_mm->z());
   if (!result.second) return {};
   const GlandResult::Second& second = *result.second;
   return fmt::format(

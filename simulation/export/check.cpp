@@ -107,6 +107,8 @@ void check_exportable(Solver solver, const meshing::TetMesh& mesh, const meshing
            "only a breast on its muscle is written");
   if (model.contact.kind != ContactKind::off)
     refuse(words, "[contact] (skin on smooth surfaces: skin or chest)", "leave the table out of the model");
+  if (model.skin.fade_mm > 0)
+    refuse(words, "skin.fade_mm (skin and cut that fade where the skin ends)", "leave the key out of the model");
   check_model(words, model);
   const Layout layout = make_layout(mesh, anatomy);
   for (const PoseLoad& pose : poses) check_fields(words, model, {mesh, anatomy, layout, pose.name}, pose.gravity);

@@ -6,11 +6,13 @@
 namespace supine::simulation {
 
 template <class Face>
-CutTerm<Face>::CutTerm(const Indices& faces, const Pattern& pattern) : elements_(faces, pattern) {}
+CutTerm<Face>::CutTerm(const Indices& faces, const Pattern& pattern, Eigen::VectorXd share)
+    : elements_(faces, pattern), share_(std::move(share)) {}
 
 template <class Face>
 void CutTerm<Face>::set_fields(const Fields<double>& fields) {
   stiffness_ = fields.cut_stiffness;
+  if (share_.size() > 0) stiffness_.array() *= share_.array();
 }
 
 template <class Face>
@@ -38,7 +40,8 @@ void CutTerm<Face>::add_parameter_derivative(const State& state, const Fields<Du
     const NodeRows<n> moved = gather<n>(state.x, elements_.nodes(), e) - rest;
     for (int p = 0; p < Face::points; ++p) {
       const auto& value = Face::table().value[p];
-      const Eigen::Vector3d force = fields.cut_stiffness[e * Face::points + p].v[0] * (moved.transpose() * value);
+      const Eigen::Vector3d force =
+          share(e * Face::points + p) * fields.cut_stiffness[e * Face::points + p].v[0] * (moved.transpose() * value);
       const double area = face_point<Face>(rest, p).area;
       for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += area * value[a] * force;
     }

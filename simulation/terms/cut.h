@@ -10,14 +10,18 @@ namespace supine::simulation {
 template <class Face>
 class CutTerm : public Term {
  public:
-  CutTerm(const Indices& faces, const Pattern& pattern);
+  /// @param share  of the stiffness at each quadrature point (skin_end_fade.h); empty: all of it
+  CutTerm(const Indices& faces, const Pattern& pattern, Eigen::VectorXd share);
 
   void set_fields(const Fields<double>& fields) override;
   void add(const State& state, const Demand& demand, Sums& sums) const override;
   void add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const override;
 
  private:
+  double share(Eigen::Index point) const { return share_.size() > 0 ? share_[point] : 1; }
+
   Elements elements_;
+  Eigen::VectorXd share_;
   Eigen::VectorXd stiffness_;  // per point, kPa/mm
 };
 

@@ -20,17 +20,20 @@ struct Tri3Centroid {
 template <class Face>
 class SkinTerm : public Term {
  public:
-  SkinTerm(const Indices& faces, const Pattern& pattern, const SkinSettings& settings);
+  /// @param share  of the stiffness at each quadrature point (skin_end_fade.h); empty: all of it
+  SkinTerm(const Indices& faces, const Pattern& pattern, const SkinSettings& settings, Eigen::VectorXd share);
 
   void set_fields(const Fields<double>& fields) override;
   void add(const State& state, const Demand& demand, Sums& sums) const override;
   void add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const override;
 
  private:
+  double weight(int e, int p) const;
   void add_face(int e, const State& state, const Demand& demand, Local<Face::nodes>& local) const;
 
   Elements elements_;
   SkinSettings settings_;
+  Eigen::VectorXd share_;
   std::vector<SkinMaterial<double>> material_;  // per face
 };
 

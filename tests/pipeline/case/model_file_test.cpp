@@ -133,6 +133,14 @@ TEST_F(ModelFile, OnlyTheCorotationalSkinHasAPoissonRatio) {
   EXPECT_EQ(read("[skin]\nlaw = \"corotational\"\npoisson_ratio = 0.3\n").skin.poisson_ratio.value, 0.3);
 }
 
+TEST_F(ModelFile, SkinFadesOverALengthIfThatIsAskedFor) {
+  EXPECT_EQ(read("[skin]\nlaw = \"neo_hookean\"\n").skin.fade_mm, 0);
+  EXPECT_EQ(read("[skin]\nfade_mm = 12.5\n").skin.fade_mm, 12.5);
+  EXPECT_THROW(read("[skin]\nfade_mm = -1\n"), InputError);
+  EXPECT_THROW(read("[skin]\nfade_mm = 51\n"), InputError);
+  EXPECT_THROW(read("[cut]\nfade_mm = 5\n"), InputError);
+}
+
 TEST_F(ModelFile, ContactIsOffUnlessItIsAskedFor) {
   EXPECT_EQ(read(good).contact.kind, simulation::ContactKind::off);
   const auto said = read(good + "[contact]\nkind = \"skin\"\nstiffness_kpa_per_mm = 3.5\nband_mm = 0.7\n").contact;

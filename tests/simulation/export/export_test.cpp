@@ -177,6 +177,9 @@ TEST(SecondOpinion, RefusesWhatTheOtherSolverHasNoWordsFor) {
   Model wrinkling = calculix;
   wrinkling.skin.compression = Compression::tension_field;
   expect_words(refusal(Solver::calculix, wrinkling), {"tension_field", "\"full\"", "skin.young_modulus_kpa = 0"});
+  Model fading = febio;
+  fading.skin.fade_mm = 10;
+  expect_words(refusal(Solver::febio, fading), {"FEBio", "skin.fade_mm"});
   expect_words(refusal(Solver::febio, exportable(BulkLaw::neo_hookean, true, SkinLaw::corotational)),
                {"skin.law = \"corotational\"", "neo_hookean"});
 }

@@ -23,6 +23,7 @@ struct Case {
   Compression compression;
   DensityReference density;
   double poisson = 0.45;
+  double fade_mm = 0;
 };
 
 // All terms at once on a small box, away from equilibrium, with x and X both moved from the imaged shape.
@@ -40,6 +41,7 @@ class TermsTest : public ::testing::TestWithParam<Case> {
     }
     model = testing::soft_model(GetParam().law, GetParam().skin);
     model.skin.compression = GetParam().compression;
+    model.skin.fade_mm = GetParam().fade_mm;
     model.breast.density_refers_to = GetParam().density;
     model.breast.poisson_ratio.value = GetParam().poisson;
     model.breast.yeoh_c3_ratio.value = 0.3;
@@ -232,6 +234,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{1, BulkLaw::gent, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged},
         Case{1, BulkLaw::neo_hookean_calculix, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged},
         Case{2, BulkLaw::yeoh, SkinLaw::neo_hookean, Compression::full, DensityReference::undeformed},
+        Case{1, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged, 0.45, 20},
+        Case{2, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged, 0.45, 20},
         // Nearly incompressible: the mean dilation of each cell carries most of λ.
         Case{2, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged, 0.49},
         Case{2, BulkLaw::mooney_rivlin, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged, 0.49},
