@@ -71,14 +71,19 @@ class Splitter {
     const Place a = mean(v[0], v[1]), b = mean(v[1], v[2]), d = mean(v[0], v[2]), e = mean(v[0], v[3]),
                 f = mean(v[1], v[3]), g = mean(v[2], v[3]);
     // The octahedron between the corners is cut along d-f.
-    return {{{v[0], a, d, e}, {a, v[1], b, f}, {d, b, v[2], g}, {e, f, g, v[3]},
-             {d, f, b, a}, {d, f, g, b}, {d, f, e, g}, {d, f, a, e}}};
+    return {{{v[0], a, d, e},
+             {a, v[1], b, f},
+             {d, b, v[2], g},
+             {e, f, g, v[3]},
+             {d, f, b, a},
+             {d, f, g, b},
+             {d, f, e, g},
+             {d, f, a, e}}};
   }
 
   void add_cell(std::array<Place, 4> corners, Eigen::Ref<Eigen::RowVectorXi> row) {
     Eigen::Matrix3d edges;
-    for (int i = 0; i < 3; ++i)
-      edges.row(i) = at(corners[static_cast<std::size_t>(i + 1)]) - at(corners[0]);
+    for (int i = 0; i < 3; ++i) edges.row(i) = at(corners[static_cast<std::size_t>(i + 1)]) - at(corners[0]);
     if (edges.determinant() < 0) std::swap(corners[2], corners[3]);
     for (int i = 0; i < 4; ++i) row[i] = node(corners[static_cast<std::size_t>(i)]);
     for (int e = 0; e < 6; ++e) {

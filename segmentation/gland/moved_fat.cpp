@@ -18,10 +18,11 @@ constexpr double farthest_mm = 2.5, step_voxels = 0.25;
 constexpr double farthest_voxels = 1.75, usual_voxel_mm = 1.4;
 constexpr int lobes = 3;    // of the windowed sine that reads between voxels
 constexpr int margin = 18;  // zeros between lines: more than a shift and what reads between voxels, of some together
-constexpr int rough = 25, fine = 60;  // steps of the projected gradient
+constexpr int rough = 25, fine = 40;  // steps of the projected gradient
 constexpr std::size_t fewest = 1000, most_looked_at = 200'000;
 
-/// Lines of voxels along one axis behind one another, far enough apart that no shift leads from one to the next.
+/// Lines of voxels along one axis, from the first to the last that is known, behind one another, far enough apart that
+/// no shift leads from one to the next.
 struct Lines {
   std::vector<float> contrast, known;  ///< known: 1 or 0
   std::vector<std::size_t> voxel;      ///< of the grid; where known is 1
@@ -42,21 +43,20 @@ Lines lines_of(const std::vector<float>& contrast, const Mask& within, const Gri
       Eigen::Vector3i index;
       index[across_slices] = slice;
       index[third] = b;
-      bool any = false;
-      const std::size_t before = lines.contrast.size();
-      for (int a = 0; a < grid.size[axis]; ++a) {
+      const auto voxel = [&](int a) {
         index[axis] = a;
-        const std::size_t n = grid.index(index.x(), index.y(), index.z());
-        any = any || within[n];
+        return grid.index(index.x(), index.y(), index.z());
+      };
+      int begin = 0, end = grid.size[axis];
+      while (begin < end && !within[voxel(begin)]) ++begin;
+      while (begin < end && !within[voxel(end - 1)]) --end;
+      for (int a = begin; a < end; ++a) {
+        const std::size_t n = voxel(a);
         lines.contrast.push_back(within[n] ? contrast[n] : 0);
         lines.known.push_back(within[n] ? 1 : 0);
         lines.voxel.push_back(n);
       }
-      if (any) {
-        pad();
-        continue;
-      }
-      lines.contrast.resize(before), lines.known.resize(before), lines.voxel.resize(before);
+      if (begin < end) pad();
     }
   return lines;
 }
