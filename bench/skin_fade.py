@@ -8,6 +8,7 @@ import argparse
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 
 import numpy as np
@@ -18,7 +19,7 @@ from vtk.util.numpy_support import vtk_to_numpy
 def run(*command):
     done = subprocess.run([str(word) for word in command], env=dict(os.environ, OMP_NUM_THREADS="1"),
                           capture_output=True, text=True)
-    if done.returncode > 1:
+    if done.returncode not in (0, 1):
         raise RuntimeError(f"{command[0]}: {done.stderr[-500:]}")
 
 
@@ -51,10 +52,15 @@ def main():
     print("| fade_mm | way, rms mm | off, rms mm | off along the way |\n|---|---|---|---|")
     for fade in asked.fade_mm:
         model = asked.work / f"fade-{fade:g}.toml"
-        model.write_text(re.sub(r"(?m)^\[skin\]$", f"[skin]\nfade_mm = {fade:g}", asked.model.read_text()))
+        plain = re.sub(r"(?m)^fade_mm = .*\n", "", asked.model.read_text())
+        text, found = re.subn(r"(?m)^\[skin\].*$", f"[skin]\nfade_mm = {fade:g}", plain)
+        if found != 1:
+            raise SystemExit(f"{asked.model}: one table [skin] is needed, there are {found}")
+        model.write_text(text)
         way = {}
         for name, mesh in (("mesh", asked.mesh), ("finer", finer)):
             out = asked.work / f"{name}-{fade:g}"
+            shutil.rmtree(out, ignore_errors=True)
             run(asked.bin / "supine-simulate", asked.case, mesh, "--pose", "supine", "--model", model, "-o", out,
                 "--force")
             way[name] = nodes(out / "supine.vtu") - nodes(out / "prone.vtu")

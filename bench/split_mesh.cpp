@@ -7,6 +7,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <exception>
+#include <iterator>
 #include <map>
 #include <utility>
 #include <vector>

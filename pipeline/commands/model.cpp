@@ -110,7 +110,7 @@ class ModelTool : public Tool {
     for (const Parameter& row : simulation::base_parameters())
       if (simulation::why_not_of(model, row.name).empty())
         say(row.name.c_str(), simulation::base_setting(model, row.name));
-    if (model.skin.fade_mm > 0) run.say(fmt::format("  {:<36}{}", "skin.fade_mm", model.skin.fade_mm));
+    run.say(fmt::format("  {:<36}{}", "skin.fade_mm", model.skin.fade_mm));
     if (model.contact.kind != simulation::ContactKind::off) {
       run.say(model.contact.kind == simulation::ContactKind::skin ? "contact of skin with skin"
               : model.contact.kind == simulation::ContactKind::chest

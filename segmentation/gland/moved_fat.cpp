@@ -16,10 +16,26 @@ namespace {
 constexpr double farthest_mm = 2.5, step_voxels = 0.25;
 // Shifts by more voxels are told from noise by their own freedom alone; where voxels are finer some are taken together.
 constexpr double farthest_voxels = 1.75, usual_voxel_mm = 1.4;
-constexpr int lobes = 3;    // of the windowed sine that reads between voxels
-constexpr int margin = 18;  // zeros between lines: more than a shift and what reads between voxels, of some together
+constexpr int lobes = 3;              // of the windowed sine that reads between voxels
 constexpr int rough = 25, fine = 40;  // steps of the projected gradient
 constexpr std::size_t fewest = 1000, most_looked_at = 200'000;
+
+/// The thicker of the other two axes; the last of two alike.
+int across_slices(const Grid& grid, int axis) {
+  const int a = axis == 0 ? 1 : 0, b = axis == 2 ? 1 : 2;
+  return grid.spacing_mm[a] > grid.spacing_mm[b] ? a : b;
+}
+
+int voxels_together(double spacing_mm) {
+  return std::max(1, static_cast<int>(std::lround(usual_voxel_mm / spacing_mm)));
+}
+
+/// Zeros between lines: more than a shift and what reads between voxels, of some together.
+int margin_of(double spacing_mm) {
+  const int together = voxels_together(spacing_mm);
+  return std::max(together * (static_cast<int>(std::ceil(farthest_voxels)) + lobes + 2),
+                  static_cast<int>(std::ceil(farthest_mm / spacing_mm)) + lobes + 1);
+}
 
 /// Lines of voxels along one axis, from the first to the last that is known, behind one another, far enough apart that
 /// no shift leads from one to the next.
@@ -29,19 +45,20 @@ struct Lines {
 };
 
 Lines lines_of(const std::vector<float>& contrast, const Mask& within, const Grid& grid, int axis,
-               const std::vector<int>& slices, int across_slices) {
+               const std::vector<int>& slices, int across) {
   Lines lines;
-  const auto pad = [&lines] {
+  const auto margin = static_cast<std::size_t>(margin_of(grid.spacing_mm[axis]));
+  const auto pad = [&lines, margin] {
     lines.contrast.insert(lines.contrast.end(), margin, 0);
     lines.known.insert(lines.known.end(), margin, 0);
     lines.voxel.insert(lines.voxel.end(), margin, 0);
   };
-  const int third = 3 - axis - across_slices;
+  const int third = 3 - axis - across;
   pad();
   for (const int slice : slices)
     for (int b = 0; b < grid.size[third]; ++b) {
       Eigen::Vector3i index;
-      index[across_slices] = slice;
+      index[across] = slice;
       index[third] = b;
       const auto voxel = [&](int a) {
         index[axis] = a;
@@ -133,16 +150,16 @@ Unmixed unmix(const Lines& lines, const Mixing& mixing, int steps) {
 }
 
 /// Slices with the most gland, together no more than some voxels.
-std::vector<int> slices_to_look_at(const std::vector<float>& contrast, const Mask& within, const Grid& grid,
-                                   int across_slices, double pure) {
-  const int count = grid.size[across_slices];
+std::vector<int> slices_to_look_at(const std::vector<float>& contrast, const Mask& within, const Grid& grid, int across,
+                                   double pure) {
+  const int count = grid.size[across];
   std::vector<std::size_t> gland(static_cast<std::size_t>(count), 0), all = gland;
   for (int k = 0; k < grid.size.z(); ++k)
     for (int j = 0; j < grid.size.y(); ++j)
       for (int i = 0; i < grid.size.x(); ++i) {
         const std::size_t n = grid.index(i, j, k);
         if (!within[n]) continue;
-        const auto slice = static_cast<std::size_t>(Eigen::Vector3i(i, j, k)[across_slices]);
+        const auto slice = static_cast<std::size_t>(Eigen::Vector3i(i, j, k)[across]);
         ++all[slice];
         gland[slice] += contrast[n] > 0.5 * pure;
       }
@@ -180,7 +197,7 @@ Lines together(const Lines& lines, int count) {
 
 /// The shift that explains most against its opposite, of those along one axis.
 Shift best_along(const Lines& lines, int axis, double spacing_mm, double w) {
-  constexpr double enough = 0.6;
+  constexpr double enough = 0.6, tiny = 1e-9;
   const int count = static_cast<int>(std::min(farthest_mm / spacing_mm, farthest_voxels) / step_voxels);
   std::vector<double> left(static_cast<std::size_t>(2 * count));
 #pragma omp parallel for schedule(dynamic)
@@ -190,7 +207,8 @@ Shift best_along(const Lines& lines, int axis, double spacing_mm, double w) {
   }
   Shift best;
   for (int n = 0; n < 2 * count; ++n) {
-    const double gain = std::log(left[static_cast<std::size_t>(n ^ 1)] / left[static_cast<std::size_t>(n)]);
+    const double gain = std::log(std::max(left[static_cast<std::size_t>(n ^ 1)], tiny) /
+                                 std::max(left[static_cast<std::size_t>(n)], tiny));
     if (gain > best.against_opposite && left[static_cast<std::size_t>(n)] < enough * std::max(left[0], left[1]))
       best = {axis, spacing_mm * step_voxels * (n / 2 + 1) * (n % 2 == 0 ? 1 : -1), gain};
   }
@@ -203,23 +221,20 @@ std::optional<MovedFat> find_moved_fat(const std::vector<float>& contrast, const
                                        double pure) {
   constexpr double least_gain = 0.35;
   if (static_cast<std::size_t>(std::count(within.begin(), within.end(), 1)) < fewest) return {};
-  const std::vector<int> axes = axes_of_slices(grid);
-  int across_slices = 0;
-  grid.spacing_mm.maxCoeff(&across_slices);
-  if (axes.size() == 3) across_slices = 2;
-  const std::vector<int> some = slices_to_look_at(contrast, within, grid, across_slices, pure);
   Shift best;
-  for (const int axis : axes) {
-    if (axis == across_slices) continue;
-    const int count = std::max(1, static_cast<int>(std::lround(usual_voxel_mm / grid.spacing_mm[axis])));
-    const Lines lines = together(lines_of(contrast, within, grid, axis, some, across_slices), count);
+  for (const int axis : axes_of_slices(grid)) {
+    const int across = across_slices(grid, axis);
+    const std::vector<int> some = slices_to_look_at(contrast, within, grid, across, pure);
+    const int count = voxels_together(grid.spacing_mm[axis]);
+    const Lines lines = together(lines_of(contrast, within, grid, axis, some, across), count);
     const Shift along = best_along(lines, axis, count * grid.spacing_mm[axis], 1 - pure);
     if (along.against_opposite > best.against_opposite) best = along;
   }
   if (best.axis < 0 || best.against_opposite < least_gain) return {};
-  std::vector<int> all(static_cast<std::size_t>(grid.size[across_slices]));
+  const int across = across_slices(grid, best.axis);
+  std::vector<int> all(static_cast<std::size_t>(grid.size[across]));
   std::iota(all.begin(), all.end(), 0);
-  const Lines lines = lines_of(contrast, within, grid, best.axis, all, across_slices);
+  const Lines lines = lines_of(contrast, within, grid, best.axis, all, across);
   const Unmixed unmixed = unmix(lines, Mixing(best.mm / grid.spacing_mm[best.axis], 1 - pure), fine);
   MovedFat result{best.mm * grid.direction.col(best.axis), std::vector<float>(contrast.size(), 0)};
   for (std::size_t n = 0; n < lines.voxel.size(); ++n)

@@ -270,7 +270,7 @@ std::string StepRunner::run(const Planes& step) {
   return line;
 }
 
-std::string second_words(const GlandResult& result) {
+std::string shift_words(const GlandResult& result) {
   if (result.fat_shift_mm)
     return fmt::format("; fat lies ({:.1f}, {:.1f}, {:.1f}) mm aside, gland was put back", result.fat_shift_mm->x(),
                        result.fat_shift_mm->y(), result.fat_shift_mm->z());
@@ -307,7 +307,7 @@ std::string StepRunner::run(const Gland& step) {
              "under the skin)",
              100 * result.fat_sd, 100 * result.pure, result.shading_low, result.shading_high, result.failed_ml,
              result.aside_ml, place.back_y_mm) +
-         second_words(result);
+         shift_words(result);
 }
 
 }  // namespace

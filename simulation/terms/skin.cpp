@@ -153,7 +153,7 @@ SkinTerm<Face>::SkinTerm(const Indices& faces, const Pattern& pattern, const Ski
     : elements_(faces, pattern), settings_(settings), share_(std::move(share)) {}
 
 template <class Face>
-double SkinTerm<Face>::weight(int e, int p) const {
+double SkinTerm<Face>::weight_of(int e, int p) const {
   return Face::table().weight[p] * (share_.size() > 0 ? share_[e * Face::points + p] : 1);
 }
 
@@ -169,7 +169,7 @@ void SkinTerm<Face>::add_face(int e, const State& state, const Demand& demand, L
   const NodeRows<n> x = gather<n>(state.x, elements_.nodes(), e), rest = gather<n>(state.X, elements_.nodes(), e);
   for (int p = 0; p < Face::points; ++p) {
     const auto& gradient = Face::table().gradient[p];
-    const double weight = this->weight(e, p);
+    const double weight = weight_of(e, p);
     const Eigen::Matrix<double, 3, 2> now = x.transpose() * gradient, before = rest.transpose() * gradient;
     MembraneTangent point;
     if (demand.tangent || demand.reference_tangent) {
@@ -207,7 +207,7 @@ void SkinTerm<Face>::add_parameter_derivative(const State& state, const Fields<D
       const Metric<Dual> g = metric(now).template cast<Dual>(), rest_g = metric(before).template cast<Dual>();
       const auto point = membrane_point<Dual>(settings_, skin_material(fields, e), g, rest_g);
       const Metric<double> derivative(point.stress[0].v[0], point.stress[1].v[0], point.stress[2].v[0]);
-      const auto force = membrane_force<n>(gradient, derivative, now, weight(e, p));
+      const auto force = membrane_force<n>(gradient, derivative, now, weight_of(e, p));
       for (int a = 0; a < n; ++a) local.residual.template segment<3>(3 * a) += force.row(a).transpose();
     }
   });

@@ -28,7 +28,7 @@ class SkinTerm : public Term {
   void add_parameter_derivative(const State& state, const Fields<Dual>& fields, Sums& sums) const override;
 
  private:
-  double weight(int e, int p) const;
+  double weight_of(int e, int p) const;
   void add_face(int e, const State& state, const Demand& demand, Local<Face::nodes>& local) const;
 
   Elements elements_;

@@ -83,9 +83,16 @@ TEST(MovedFat, IsNotToldWhereNoneMovedWhereThereIsNoGlandOrHardlyAVoxel) {
   std::normal_distribution<float> scatter(0, 0.05F);
   for (float& c : fat.contrast) c = scatter(random);
   EXPECT_FALSE(find_moved_fat(fat.contrast, fat.within, fat.grid, pure));
-  Series few(Vector3d(1.8, 0, 0));
-  for (std::size_t n = 900; n < few.within.size(); ++n) few.within[n] = 0;
-  EXPECT_FALSE(find_moved_fat(few.contrast, few.within, few.grid, pure));
+  Series some(Vector3d(1.8, 0, 0));  // a block in the middle of the gland
+  const auto leave = [&some](int from, int slices) {
+    for (int k = 0; k < 14; ++k)
+      for (int j = 0; j < 60; ++j)
+        for (int i = 0; i < 70; ++i)
+          some.within[some.grid.index(i, j, k)] =
+              k >= from && k < from + slices && j >= 18 && j < 42 && i >= 20 && i < 50;
+  };
+  leave(6, 1);  // 720 voxels
+  EXPECT_FALSE(find_moved_fat(some.contrast, some.within, some.grid, pure));
 }
 
 TEST(MovedFat, AlongThickSlicesIsNotLookedFor) {

@@ -170,6 +170,19 @@ TEST(GlandByTwoSeries, OfOneKindAreRefused) {
   EXPECT_NE(said.find("with fat suppression and one without"), std::string::npos) << said;
 }
 
+TEST(GlandByOneSeries, IsPutBackWhereFatLiesAsideAndElseLeft) {
+  const Breast b;
+  const Vector3d fat_shift(2.5, 0, 0);
+  const GlandResult back = find_gland(series(b.grid, 100, 40, 2, in_place, fat_shift), b.place, {});
+  ASSERT_TRUE(back.fat_shift_mm);
+  EXPECT_LT((*back.fat_shift_mm - fat_shift).norm(), 0.76) << back.fat_shift_mm->transpose();
+  EXPECT_GT(b.dice(back.gland), 0.9);
+  EXPECT_FALSE(find_gland(series(b.grid, 100, 40, 2, in_place), b.place, {}).fat_shift_mm);
+  GlandOptions bright;
+  bright.contrast = GlandOptions::Contrast::bright;
+  EXPECT_FALSE(find_gland(series(b.grid, 30, 120, 3, in_place, fat_shift), b.place, bright).fat_shift_mm);
+}
+
 TEST(GlandByTwoSeries, IsBetterThanByTheNoisierAndLiesWhereTheGlandIs) {
   const Breast b;
   const Vector3d fat_shift(2, 0, 0), moved_by(1, -2, 0);

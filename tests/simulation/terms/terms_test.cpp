@@ -7,6 +7,8 @@
 #include "simulation/mechanics.h"
 #include "simulation/model_fields.h"
 #include "simulation/terms/bulk.h"
+#include "simulation/terms/skin.h"
+#include "simulation/terms/skin_end_fade.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"
 
@@ -219,6 +221,53 @@ TEST(Springs, CarryStiffnessTimesAreaTimesWay) {
   EXPECT_NEAR(force.x(), (0.2 * base + 1.0 * sides) * 0.3, 1e-3);
   EXPECT_NEAR(force.z(), (3.0 * base + 1.0 * sides) * 0.5, 1e-3);
   EXPECT_NEAR(sums.energy, 0.5 * ((0.2 * base + sides) * 0.09 + (3.0 * base + sides) * 0.25), 1e-3);
+}
+
+// The same with a cut that fades: its force is that of what is left of the stiffness at each point.
+TEST(Springs, FadeWhereTheSkinEnds) {
+  const testing::TestScene scene = testing::box_scene(4, {60, 50, 40});
+  Model model = testing::soft_model();
+  model.skin.fade_mm = 15;
+  Mechanics mechanics(scene.mesh, scene.anatomy, model);
+  mechanics.set_fields(values_of(
+      make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics.layout(), "prone"}, Eigen::Vector3d::Zero())));
+  Sums sums(mechanics.pattern());
+  const Points& X = scene.mesh.points;
+  const Points x = X.rowwise() + Eigen::RowVector3d(0.3, 0, 0);
+  mechanics.evaluate({x, X}, Demand{.residual = true}, sums);
+  double force = 0;
+  for (Eigen::Index n = 0; n < X.rows(); ++n) force += sums.residual[3 * n];
+  const FaceGroup& cut = mechanics.layout().cut;
+  const double sides = fade_from_skin_end<Tri3>(scene.mesh, cut.faces, 15).dot(cut.area_mm2);
+  EXPECT_LT(sides, 0.9 * cut.area_mm2.sum());
+  const double base = 60 * 50 * model.interface.tangential_kpa_per_mm.value;
+  EXPECT_NEAR(force, (base + model.cut.stiffness_kpa_per_mm.value * sides) * 0.3, 1e-3);
+}
+
+// Skin alone, stretched by a tenth: its energy is that of what is left of its stiffness.
+TEST(Skin, FadesWhereItEnds) {
+  const testing::TestScene scene = testing::box_scene(4, {60, 50, 40});
+  const auto energy_of = [&scene](double young_kpa, double fade_mm) {
+    Model model = testing::soft_model();
+    model.skin.young_modulus_kpa.value = young_kpa;
+    model.skin.fade_mm = fade_mm;
+    Mechanics mechanics(scene.mesh, scene.anatomy, model);
+    mechanics.set_fields(values_of(
+        make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics.layout(), "prone"}, Eigen::Vector3d::Zero())));
+    Sums sums(mechanics.pattern());
+    const Points x = 1.1 * scene.mesh.points;
+    mechanics.evaluate({x, scene.mesh.points}, Demand{.energy = true}, sums);
+    return sums.energy;
+  };
+  for (const double fade_mm : {0.0, 15.0}) {
+    Mechanics mechanics(scene.mesh, scene.anatomy, testing::soft_model());
+    const FaceGroup& skin = mechanics.layout().skin;
+    const Eigen::VectorXd share = fade_mm > 0 ? fade_from_skin_end<Tri3Centroid>(scene.mesh, skin.faces, fade_mm)
+                                              : Eigen::VectorXd::Ones(skin.faces.size());
+    const double stretched = energy_of(40, 0) - energy_of(20, 0);  // of 20 kPa more at full tension
+    const double left = energy_of(40, fade_mm) - energy_of(20, fade_mm);
+    EXPECT_NEAR(left, stretched * share.dot(skin.area_mm2) / skin.area_mm2.sum(), 1e-6 * stretched) << fade_mm;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(
