@@ -2,11 +2,11 @@
 #include "segmentation/gland/moved_fat.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "segmentation/gland/fat_shift.h"
 

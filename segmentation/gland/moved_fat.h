@@ -12,7 +12,7 @@ namespace supine::segmentation {
 /// The share of gland by one series without fat suppression in which the scanner moved the fat (chemical shift,
 /// fat_shift.h), told from that series alone.
 struct MovedFat {
-  Eigen::Vector3d fat_mm;    ///< how far fat lies from where it is
+  Eigen::Vector3d fat_mm;    ///< from where fat is to where the series shows it, in the frame of the grid
   std::vector<float> share;  ///< of gland, 0 to 1 per voxel of the grid where it is; 0 outside the mask
 };
 
@@ -23,8 +23,9 @@ struct MovedFat {
 /// 2.5 mm and 1.75 voxels (some of 1.4 mm together where they are finer) along the axes within the slices. Fitted to
 /// the opposite shift the same image leaves more: the shift is told where it leaves e^-0.35 of that and six tenths of
 /// what a shift of a quarter of a voxel leaves.
-/// @param contrast  0 fat, `pure` gland
-/// @param within  where anything is known; fewer than a thousand voxels tell nothing
+/// @param contrast  one per voxel of @p grid: 0 fat, @p pure gland (0.6 = 60 % darker than fat)
+/// @param within  of @p grid, where anything is known; fewer than a thousand voxels tell nothing
+/// @param pure  1 - w, in (0, 1)
 /// @return nothing where no shift is told
 std::optional<MovedFat> find_moved_fat(const std::vector<float>& contrast, const Mask& within, const Grid& grid,
                                        double pure);

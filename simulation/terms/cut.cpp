@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/terms/cut.h"
 
+#include <utility>
+
 #include "simulation/elements/surface_geometry.h"
 
 namespace supine::simulation {

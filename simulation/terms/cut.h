@@ -10,7 +10,7 @@ namespace supine::simulation {
 template <class Face>
 class CutTerm : public Term {
  public:
-  /// @param share  of the stiffness at each quadrature point (skin_end_fade.h); empty: all of it
+  /// @param share  of the stiffness, 0 to 1, #faces × Face::points as fade_from_skin_end gives it; empty: all of it
   CutTerm(const Indices& faces, const Pattern& pattern, Eigen::VectorXd share);
 
   void set_fields(const Fields<double>& fields) override;

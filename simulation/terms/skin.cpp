@@ -4,6 +4,7 @@
 #include <ceres/jet.h>
 
 #include <Eigen/Eigenvalues>
+#include <utility>
 
 #include "simulation/terms/constant.h"
 

@@ -20,7 +20,7 @@ struct Tri3Centroid {
 template <class Face>
 class SkinTerm : public Term {
  public:
-  /// @param share  of the stiffness at each quadrature point (skin_end_fade.h); empty: all of it
+  /// @param share  of the stiffness, 0 to 1, #faces × Face::points as fade_from_skin_end gives it; empty: all of it
   SkinTerm(const Indices& faces, const Pattern& pattern, const SkinSettings& settings, Eigen::VectorXd share);
 
   void set_fields(const Fields<double>& fields) override;

@@ -177,6 +177,9 @@ TEST(GlandByOneSeries, IsPutBackWhereFatLiesAsideAndElseLeft) {
   ASSERT_TRUE(back.fat_shift_mm);
   EXPECT_LT((*back.fat_shift_mm - fat_shift).norm(), 0.76) << back.fat_shift_mm->transpose();
   EXPECT_GT(b.dice(back.gland), 0.9);
+  double share = 0, truth = 0;
+  for (std::size_t n = 0; n < back.fraction.size(); ++n) share += back.fraction[n], truth += b.truth[n];
+  EXPECT_NEAR(share / truth, 1, 0.1);
   EXPECT_FALSE(find_gland(series(b.grid, 100, 40, 2, in_place), b.place, {}).fat_shift_mm);
   GlandOptions bright;
   bright.contrast = GlandOptions::Contrast::bright;
