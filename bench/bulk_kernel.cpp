@@ -36,7 +36,7 @@ template <class Element>
 void measure(const testing::TestScene& scene, BulkLaw law, double poisson) {
   const auto cells = scene.mesh.cells.rows();
   const Pattern pattern(scene.mesh.cells, scene.mesh.points.rows());
-  BulkTerm<Element> term(scene.mesh.cells, pattern, BulkSettings{law});
+  BulkTerm<Element> term(std::make_shared<const Elements>(scene.mesh.cells, pattern), BulkSettings{law});
   Fields<double> fields;
   fields.ln_young = fields.stiffening = fields.law_shape_1 = fields.law_shape_2 = Eigen::VectorXd::Zero(cells);
   if (law == BulkLaw::mooney_rivlin || law == BulkLaw::gent) fields.law_shape_1.setConstant(0.7);

@@ -141,9 +141,10 @@ Linearisation linearise(Evaluator& evaluator, const simulation::Sensitivities& s
   const Eigen::VectorXd unit = parameters.slope(u);
   Linearisation result;
   result.slope.resize(residuals.size(), parameters.size());
+  std::vector<simulation::ChainDerivative> derivatives = sensitivities.of(parameters.names());
   for (Eigen::Index i = 0; i < parameters.size(); ++i) {
     const std::string& name = parameters.names()[static_cast<std::size_t>(i)];
-    simulation::ChainDerivative derivative = sensitivities.of(name);
+    simulation::ChainDerivative& derivative = derivatives[static_cast<std::size_t>(i)];
     result.slope.col(i) = unit[i] * slope_at(evaluator, model, prediction, residuals, name, derivative);
     derivative.X *= unit[i];
     derivative.prone *= unit[i];

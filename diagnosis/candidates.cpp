@@ -56,10 +56,17 @@ std::vector<Candidate> find_candidates(calibration::Evaluator& evaluator, const 
                                        const calibration::Fit& fit, std::vector<std::string>& unseen) {
   const simulation::Sensitivities sensitivities(evaluator.chain(), model, fit.prediction.solution);
   std::vector<Candidate> candidates;
-  for (const Candidate& lacking : lacking_effects(model, *evaluator.scene().mesh, *evaluator.scene().anatomy)) {
+  const std::vector<Candidate> lacking_ones =
+      lacking_effects(model, *evaluator.scene().mesh, *evaluator.scene().anatomy);
+  std::vector<std::string> names;
+  for (const Candidate& lacking : lacking_ones)
+    for (const CandidateParameter& number : lacking.parameters) names.push_back(number.name);
+  std::vector<simulation::ChainDerivative> motions = sensitivities.of(names);
+  auto next = motions.begin();
+  for (const Candidate& lacking : lacking_ones) {
     Candidate candidate{lacking.effect, {}, Eigen::MatrixXd(fit.residuals.size(), 0), {}};
     for (const CandidateParameter& number : lacking.parameters) {
-      auto motion = std::make_shared<const simulation::ChainDerivative>(sensitivities.of(number.name));
+      auto motion = std::make_shared<const simulation::ChainDerivative>(std::move(*next++));
       const Eigen::VectorXd slope =
           calibration::slope_at(evaluator, model, fit.prediction, fit.residuals, number.name, *motion);
       const double rms = slope.norm() / std::sqrt(static_cast<double>(slope.size()));

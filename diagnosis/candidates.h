@@ -26,6 +26,7 @@ struct Candidate {
   std::vector<CandidateParameter> parameters;
   Eigen::MatrixXd slope;     ///< ∂d/∂(parameter) at its null, #R by #parameters, mm per unit; through both solves
   Eigen::VectorXd secant{};  ///< change of the distances at the usual size, #R; empty where it was not solved
+  bool no_secant = false;    ///< no equilibrium was found there
   double secant_to = 0;      ///< offset of its number from the null at which the secant was taken; 0: there is none
   std::shared_ptr<const simulation::ChainSolution> secant_at{};  ///< the chain there, where it was kept
   std::shared_ptr<const StandIn> stand_in{};                     ///< where straight lines promise too much of it

@@ -44,15 +44,19 @@ MatrixXd slopes(const calibration::MeasuredScene& scene, const simulation::Model
   const calibration::ModelSkin skin(*scene.mesh, x);
   const VectorXd area = node_areas(skin, x);
   const MatrixXd weight = gaussian_kernel(x, centres, width);
-  std::vector<Points> moves(fit.prediction.poses.size());
-  MatrixXd columns(fit.residuals.size(), 3 * centres.rows());
+  std::vector<VectorXd> forces;
   for (Index c = 0; c < centres.rows(); ++c)
     for (int axis = 0; axis < 3; ++axis) {
-      VectorXd force = VectorXd::Zero(x.size());
+      VectorXd& force = forces.emplace_back(VectorXd::Zero(x.size()));
       for (const int node : skin.nodes()) force[3 * node + axis] = area[node] * weight(node, c);
-      moves[pose] = sensitivities.moved_by(pose, force);
-      columns.col(3 * c + axis) = calibration::distance_change(fit.prediction, fit.residuals, moves);
     }
+  const std::vector<Points> moved = sensitivities.moved_by(pose, forces);
+  std::vector<Points> moves(fit.prediction.poses.size());
+  MatrixXd columns(fit.residuals.size(), 3 * centres.rows());
+  for (Index f = 0; f < columns.cols(); ++f) {
+    moves[pose] = moved[static_cast<std::size_t>(f)];
+    columns.col(f) = calibration::distance_change(fit.prediction, fit.residuals, moves);
+  }
   return columns;
 }
 

@@ -7,8 +7,8 @@
 
 #include "calibration/error_model.h"
 #include "common/error.h"
-#include "common/first_failure.h"
 #include "common/rms.h"
+#include "common/side_by_side.h"
 #include "diagnosis/creases.h"
 #include "diagnosis/other_mesh.h"
 #include "diagnosis/weighted_fit.h"
@@ -235,15 +235,7 @@ void measure_on_two(const calibration::MeasuredScene& scene, const simulation::M
     const auto make = [&] { return coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share); };
     result.coarser_mm = change_on(scene, model, fit, near ? &near->on_coarser : nullptr, make, result.on_coarser);
   };
-  FirstFailure failure;
-#pragma omp parallel sections
-  {
-#pragma omp section
-    failure.guard([&] { attempt(result.finer_failure, finer); });
-#pragma omp section
-    failure.guard([&] { attempt(result.coarser_failure, coarser); });
-  }
-  failure.rethrow();
+  side_by_side({[&] { attempt(result.finer_failure, finer); }, [&] { attempt(result.coarser_failure, coarser); }});
 }
 
 /// Root of a field of squares as seen around each point, over its root mean square where @p counts: edges err by more

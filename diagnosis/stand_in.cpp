@@ -60,9 +60,10 @@ class Imitation {
     const FreeParameters there(model_with(candidate, size));
     const bool expected = priors_.is_expected(candidate.effect);
     const VectorXd change = candidate.secant.size() > 0 ? candidate.secant : VectorXd(size * candidate.slope.col(0));
+    if (!expected && candidate.no_secant) return nullptr;
     const double along_lines = left_of(metric_.whitening->apply(change), slope_);
     if (!expected && !settles(along_lines, 1)) return nullptr;
-    calibration::Evaluator evaluator(scene_, there.base(), accurate_enough());
+    calibration::Evaluator evaluator(scene_, there.base(), expected ? accurate_enough() : accurate_enough_far_away());
     WeightedFit fit;
     {
       // Of an effect that the case does not expect it is a figure beside the verdict: worth one solve from nothing.

@@ -54,7 +54,9 @@ int curved_cell(const meshing::TetMesh& mesh, const std::vector<std::vector<int>
   int cell = first;
   for (int a = 0; a < 4 && best.outside_mm > 0; ++a)
     for (const int other : around[mesh.cells(first, a)]) {
-      const CurvedPlace place = CurvedCell(mesh.points, mesh.cells, other).find(point, barycentric(mesh, other, point));
+      const CurvedCell curved(mesh.points, mesh.cells, other);
+      if (curved.least_distance_mm(point) >= best.outside_mm) continue;
+      const CurvedPlace place = curved.find(point, barycentric(mesh, other, point));
       if (place.outside_mm >= best.outside_mm) continue;
       best = place;
       cell = other;

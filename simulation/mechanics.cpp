@@ -29,13 +29,12 @@ using MembraneFace = std::conditional_t<Face::nodes == 3, Tri3Centroid, Face>;
 
 template <class Cell, class Face>
 std::vector<std::unique_ptr<Term>> make_terms(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy,
-                                              const Model& model, const Layout& layout, const Pattern& pattern) {
+                                              const Model& model, const Layout& layout, const Pattern& pattern,
+                                              const std::shared_ptr<const Elements>& cells) {
   std::vector<std::unique_ptr<Term>> terms;
-  terms.push_back(
-      std::make_unique<BulkTerm<Cell>>(mesh.cells, pattern, BulkSettings{model.breast.law, model.breast.volumetric}));
-  terms.push_back(std::make_unique<FibreTerm<Cell>>(mesh.cells, pattern, anatomy.muscle));
-  terms.push_back(
-      std::make_unique<GravityTerm<Cell>>(mesh.cells, pattern, mesh.points, model.breast.density_refers_to));
+  terms.push_back(std::make_unique<BulkTerm<Cell>>(cells, BulkSettings{model.breast.law, model.breast.volumetric}));
+  terms.push_back(std::make_unique<FibreTerm<Cell>>(cells, anatomy.muscle));
+  terms.push_back(std::make_unique<GravityTerm<Cell>>(cells, mesh.points, model.breast.density_refers_to));
   if (model.skin.young_modulus_kpa.value > 0)
     terms.push_back(std::make_unique<SkinTerm<MembraneFace<Face>>>(
         rows_of(mesh.faces, layout.skin.faces), pattern, SkinSettings{model.skin.law, model.skin.compression},
@@ -90,7 +89,8 @@ double volume_of(const Indices& cells, const Points& x) {
 
 }  // namespace
 
-Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model)
+Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
+                     const Mechanics* same_mesh)
     : mesh_(mesh), anatomy_(anatomy), layout_(make_layout(mesh, anatomy)), held_(mesh.points.rows(), 0) {
   if (layout_.interface.faces.size() == 0)
     throw InputError(anatomy.is_object()
@@ -101,9 +101,10 @@ Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anato
       throw InputError(
           fmt::format("[supports.{}] of the model is no support of this body; {}", name,
                       mesh.support_names.empty() ? "it has none with a name" : suggestion(name, mesh.support_names)));
-  pattern_ = std::make_unique<Pattern>(mesh.cells, mesh.points.rows());
-  terms_ = mesh.order() == 2 ? make_terms<Tet10, Tri6>(mesh, anatomy, model, layout_, *pattern_)
-                             : make_terms<Tet4, Tri3>(mesh, anatomy, model, layout_, *pattern_);
+  pattern_ = same_mesh ? same_mesh->pattern_ : std::make_shared<const Pattern>(mesh.cells, mesh.points.rows());
+  cells_ = same_mesh ? same_mesh->cells_ : std::make_shared<const Elements>(mesh.cells, *pattern_);
+  terms_ = mesh.order() == 2 ? make_terms<Tet10, Tri6>(mesh, anatomy, model, layout_, *pattern_, cells_)
+                             : make_terms<Tet4, Tri3>(mesh, anatomy, model, layout_, *pattern_, cells_);
   volume_ = dynamic_cast<const VolumeStrainTerm*>(terms_.front().get());
   add_contact(model.contact);
   const auto hold_group = [this, &mesh](const FaceGroup& group) {

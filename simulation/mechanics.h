@@ -21,7 +21,9 @@ class Mechanics {
   /// @param mesh, anatomy  of the imaged shape; must outlive the object
   /// @throws InputError  a law that does not go with the mesh, no interface, no skin; contact with the chest of an
   /// object or where the skin is closed
-  Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model);
+  /// @param same_mesh  another of the same mesh, whose tables of the cells are shared; or nullptr
+  Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
+            const Mechanics* same_mesh = nullptr);
 
   const Layout& layout() const { return layout_; }
   const Pattern& pattern() const { return *pattern_; }
@@ -53,7 +55,8 @@ class Mechanics {
   const meshing::TetMesh& mesh_;
   const meshing::Anatomy& anatomy_;
   Layout layout_;
-  std::unique_ptr<Pattern> pattern_;
+  std::shared_ptr<const Pattern> pattern_;
+  std::shared_ptr<const Elements> cells_;
   std::vector<std::unique_ptr<Term>> terms_;
   const VolumeStrainTerm* volume_ = nullptr;     // one of the terms
   const SkinContactTerm* contact_ = nullptr;     // one of the terms, if any

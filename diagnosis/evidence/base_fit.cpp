@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 #include <optional>
 
 #include "calibration/noise.h"
 #include "common/error.h"
+#include "common/side_by_side.h"
 #include "diagnosis/creases.h"
 #include "diagnosis/evidence/discrepancy.h"
 #include "diagnosis/evidence/field_modes.h"
@@ -90,8 +92,19 @@ void add_shared(const BaseFit& base, const Priors& priors, const VectorXd& share
     }
 }
 
-void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitivities, const Priors& priors,
-                 BaseFit& base) {
+/// What uneven tissue and forces that no catalogue lists move.
+void find_body(Evaluator& evaluator, const simulation::Sensitivities& sensitivities, const Priors& priors,
+               BaseFit& base) {
+  const calibration::Prediction& prediction = base.fit.prediction;
+  base.patches = base.clusters.means(
+      patchiness_shapes(evaluator.chain(), sensitivities, prediction, base.fit.residuals, priors.patchiness));
+  base.local = local_causes(evaluator.chain().mechanics(), priors.patchiness, base.patches);
+  base.kernel =
+      discrepancy_of(*evaluator.scene().mesh, sensitivities, prediction, base.fit.residuals, base.clusters).kernel;
+}
+
+/// Puts together what was measured of body and mesh, and the scans' noise.
+void add_up_errors(Evaluator& evaluator, const Priors& priors, BaseFit& base) {
   const Residuals& residuals = base.fit.residuals;
   VectorXd shared_mm(residuals.size());
   const auto& measurements = evaluator.scene().measurements;
@@ -108,9 +121,6 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
   base.errors = variance.cwiseQuotient(base.clusters.members).asDiagonal();
   add_shared(base, priors, base.clusters.means(noise.shared_mm), base.errors);
   add_creases(crease_error(evaluator.scene(), base.fit.prediction, residuals), base);
-  base.patches = base.clusters.means(
-      patchiness_shapes(evaluator.chain(), sensitivities, base.fit.prediction, residuals, priors.patchiness));
-  base.local = local_causes(evaluator.chain().mechanics(), priors.patchiness, base.patches);
   base.errors += base.patches * base.patches.transpose();
   base.patchiness_mm = std::sqrt(base.patches.squaredNorm() / static_cast<double>(base.patches.rows()));
   base.mean_mm = VectorXd::Zero(residuals.size());
@@ -120,8 +130,6 @@ void find_errors(Evaluator& evaluator, const simulation::Sensitivities& sensitiv
     const VectorXd coarser = base.clusters.means(base.numerical->coarser_mm);
     base.errors += doubt * doubt.transpose() + coarser * coarser.transpose();
   }
-  base.kernel =
-      discrepancy_of(*evaluator.scene().mesh, sensitivities, base.fit.prediction, residuals, base.clusters).kernel;
   base.scale_mm = std::max(priors.least_unexplained_mm, priors.share_of_way * way_mm(base.fit.prediction.solution));
   base.most_mm = priors.most_unexplained_mm;
   base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);
@@ -138,9 +146,19 @@ Weighed with_all(const LinearEvidence& evidence) {
   return evidence.weigh(all);
 }
 
-void measure_mesh(Evaluator& evaluator, BaseFit& base) {
-  const std::optional<NumericalError> before = std::move(base.numerical);
-  base.numerical = measure_numerical_error(evaluator.scene(), base.model, base.fit, before ? &*before : nullptr);
+/// Errors of body and mesh where @p base is.
+/// @param meshes  the mesh's errors of a similar model, or at least its other meshes; nullptr = of no model yet
+void find_errors(Evaluator& evaluator, JointFitter& fitter, const Priors& priors, bool other_meshes,
+                 const NumericalError* meshes, BaseFit& base) {
+  const auto sensitivities = fitter.linearise();
+  std::optional<NumericalError> numerical;
+  std::vector<std::function<void()>> works{[&] { find_body(evaluator, *sensitivities, priors, base); }};
+  if (other_meshes)
+    works.insert(works.begin(),
+                 [&] { numerical = measure_numerical_error(evaluator.scene(), base.model, base.fit, meshes); });
+  side_by_side(works);
+  base.numerical = std::move(numerical);
+  add_up_errors(evaluator, priors, base);
 }
 
 VectorXd coordinates_of(const FreeParameters& parameters, const simulation::Model& start) {
@@ -220,8 +238,8 @@ BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, con
   for (int round = 0; round < most_rounds; ++round) {
     const VectorXd measured_at = base.fit.u;
     tell("errors of mesh and body");
-    if (options.other_meshes) measure_mesh(evaluator, base);
-    find_errors(evaluator, *fitter.linearise(), options.priors, base);
+    const std::optional<NumericalError> before = std::move(base.numerical);
+    find_errors(evaluator, fitter, options.priors, options.other_meshes, before ? &*before : nullptr, base);
     fitter.descend(most_steps, [&] { tell("fit with all that is never known"); });
     if ((base.fit.u - measured_at).cwiseAbs().maxCoeff() < far) break;
   }
@@ -236,15 +254,14 @@ std::unique_ptr<BaseFit> ground_beside(const calibration::MeasuredScene& scene, 
   ground->noise_mm = base.noise_mm;
   ground->clusters = base.clusters;
   Evaluator evaluator(scene, at.model, accurate_enough());
+  NumericalError meshes;  // without solutions: those are of a model that lacks the effects
   if (base.numerical) {
-    NumericalError meshes;  // without solutions: those are of a model that lacks the effects
     meshes.coarse = base.numerical->coarse;
     meshes.on_finer.mesh = base.numerical->on_finer.mesh;
     meshes.on_coarser.mesh = base.numerical->on_coarser.mesh;
-    ground->numerical = measure_numerical_error(scene, ground->model, ground->fit, &meshes);
   }
   JointFitter fitter(evaluator, *ground, *ground);
-  find_errors(evaluator, *fitter.linearise(), priors, *ground);
+  find_errors(evaluator, fitter, priors, base.numerical.has_value(), &meshes, *ground);
   return ground;
 }
 

@@ -77,10 +77,12 @@ Discrepancy discrepancy_of(const meshing::TetMesh& mesh, const simulation::Sensi
                            const calibration::Clusters& clusters) {
   Discrepancy found{discrepancy_forces(mesh, prediction.solution.X), {}, {}};
   found.columns.resize(clusters.pose.size(), static_cast<Eigen::Index>(found.forces.size()));
+  std::vector<std::vector<Points>> moved;  // per pose and force
+  for (std::size_t pose = 0; pose < prediction.poses.size(); ++pose)
+    moved.push_back(sensitivities.moved_by(pose, found.forces));
   for (std::size_t f = 0; f < found.forces.size(); ++f) {
     std::vector<Points> moves;
-    for (std::size_t pose = 0; pose < prediction.poses.size(); ++pose)
-      moves.push_back(sensitivities.moved_by(pose, found.forces[f]));
+    for (const std::vector<Points>& by_force : moved) moves.push_back(by_force[f]);
     found.columns.col(static_cast<Eigen::Index>(f)) = clusters.means(distance_change(prediction, residuals, moves));
   }
   found.kernel = found.columns * found.columns.transpose();

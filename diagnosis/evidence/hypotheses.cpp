@@ -228,6 +228,7 @@ void find_secants(const calibration::MeasuredScene& scene, const BaseFit& base, 
         candidates[c].secant_at = std::make_shared<const simulation::ChainSolution>(std::move(moved.solution));
     } catch (const NumericalFailure&) {
       // No equilibrium at the usual size, or none that costs as little: the slope at the null has to do.
+      candidates[c].no_secant = true;
     }
   };
   FirstFailure failure;

@@ -11,6 +11,11 @@
 namespace supine::diagnosis {
 namespace {
 
+/// By the name that Sensitivities knows.
+std::string setting_of(const Nuisance& nuisance) {
+  return nuisance.effect.empty() ? nuisance.parameter : nuisance.effect + "." + nuisance.parameter;
+}
+
 using simulation::Effect;
 using simulation::EffectSetting;
 using simulation::Model;
@@ -93,15 +98,20 @@ void find_shapes(calibration::Evaluator& evaluator, const simulation::Sensitivit
     Eigen::VectorXd distances;
   };
   std::map<std::string, Slope> slopes;  // of what is another number in each pose, for all poses at once
+  for (const Nuisance& nuisance : nuisances) slopes[setting_of(nuisance)];
+  std::vector<std::string> names;
+  for (const auto& [name, slope] : slopes) names.push_back(name);
+  std::vector<simulation::ChainDerivative> motions = sensitivities.of(names);
+  auto next = motions.begin();
+  for (auto& [name, slope] : slopes) {
+    slope.motion = std::make_shared<const simulation::ChainDerivative>(std::move(*next++));
+    slope.distances = slope_at(evaluator, model, prediction, residuals, name, *slope.motion);
+  }
   const auto& measurements = evaluator.scene().measurements;
   for (Nuisance& nuisance : nuisances) {
     const bool base = nuisance.effect.empty();
-    const std::string name = base ? nuisance.parameter : nuisance.effect + "." + nuisance.parameter;
-    Slope& slope = slopes[name];
-    if (!slope.motion) {
-      slope.motion = std::make_shared<const simulation::ChainDerivative>(sensitivities.of(name));
-      slope.distances = slope_at(evaluator, model, prediction, residuals, name, *slope.motion);
-    }
+    const std::string name = setting_of(nuisance);
+    const Slope& slope = slopes.at(name);
     nuisance.motion = slope.motion;
     nuisance.motion_per_sigma = nuisance.sigma * (base ? simulation::base_setting(model, name).value : 1);
     nuisance.shape_mm = nuisance.motion_per_sigma * slope.distances;

@@ -77,9 +77,9 @@ Eigen::MatrixXd patchiness_shapes(const simulation::Chain& chain, const simulati
                                   const Patchiness& size) {
   const auto directions = patchy_directions(chain, size);
   Eigen::MatrixXd shapes(residuals.size(), static_cast<Eigen::Index>(directions.size()));
+  const std::vector<simulation::ChainDerivative> moved = sensitivities.along(directions);
   for (std::size_t k = 0; k < directions.size(); ++k)
-    shapes.col(static_cast<Eigen::Index>(k)) =
-        distance_change(prediction, residuals, sensitivities.along(directions[k]).poses);
+    shapes.col(static_cast<Eigen::Index>(k)) = distance_change(prediction, residuals, moved[k].poses);
   return shapes;
 }
 

@@ -112,8 +112,7 @@ void scale_forces(const PoseAt& at, const meshing::TetMesh& mesh, const std::vec
   const calibration::ModelSkin skin(mesh, at.x());
   const Points normals = skin.node_normals();
   double square = 0;
-  for (const VectorXd& force : forces) {
-    const Points moved = at.sensitivities.moved_by(0, force);
+  for (const Points& moved : at.sensitivities.moved_by(0, forces)) {
     for (std::size_t k = 0; k < skin.nodes().size(); ++k)
       square += std::pow(moved.row(skin.nodes()[k]).dot(normals.row(static_cast<Index>(k))), 2);
   }

@@ -17,8 +17,9 @@ Eigen::VectorXd flat(const Points& points) { return Eigen::Map<const Eigen::Vect
 Eigen::MatrixXd patches_of(const PoseAt& at, const simulation::Embedding& points, const Patchiness& patchiness) {
   const auto directions = patchy_directions(at.chain, patchiness);
   Eigen::MatrixXd all(3 * points.outside_mm().size(), static_cast<Eigen::Index>(directions.size()));
+  const std::vector<simulation::ChainDerivative> moved = at.sensitivities.along(directions);
   for (std::size_t k = 0; k < directions.size(); ++k)
-    all.col(static_cast<Eigen::Index>(k)) = flat(points.at(at.sensitivities.along(directions[k]).poses[0]));
+    all.col(static_cast<Eigen::Index>(k)) = flat(points.at(moved[k].poses[0]));
   return all;
 }
 
@@ -70,8 +71,9 @@ PointMoves moves_of(const PoseAt& at, const simulation::Embedding& points, const
     const double scale = nuisance.sigma * (base ? simulation::base_setting(at.model, name).value : 1);
     moves.nuisances.col(static_cast<Eigen::Index>(k)) = scale * moved(name);
   }
+  const std::vector<Points> by_force = at.sensitivities.moved_by(0, forces);
   for (std::size_t f = 0; f < forces.size(); ++f)
-    moves.forces.col(static_cast<Eigen::Index>(f)) = flat(points.at(at.sensitivities.moved_by(0, forces[f])));
+    moves.forces.col(static_cast<Eigen::Index>(f)) = flat(points.at(by_force[f]));
   return moves;
 }
 

@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
+#include <mutex>
 #include <utility>
 
 #include "common/error.h"
@@ -125,7 +127,9 @@ void warn_of_locking(Run& run, const CaseInputs& in) {
 
 simulation::SolveOptions solve_options(Run& run) {
   simulation::SolveOptions options;
-  options.progress = [&run](const std::string& what, double load, int iteration, double share) {
+  const auto one_at_a_time = std::make_shared<std::mutex>();  // poses are solved side by side
+  options.progress = [&run, one_at_a_time](const std::string& what, double load, int iteration, double share) {
+    const std::lock_guard lock(*one_at_a_time);
     run.progress(fmt::format("{}: load {:.0f} %, iteration {}, {:.1e} of the weight unbalanced", what, 100 * load,
                              iteration, share));
   };

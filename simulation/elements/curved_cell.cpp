@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <functional>
 
+#include "meshing/topology.h"
+
 namespace supine::simulation {
 namespace {
 
@@ -52,6 +54,17 @@ std::optional<Eigen::Vector4d> CurvedCell::inside(const Eigen::Vector3d& point, 
     return std::nullopt;
   }
   return std::nullopt;
+}
+
+double CurvedCell::least_distance_mm(const Eigen::Vector3d& point) const {
+  NodeRows<10> control = nodes_;
+  for (int e = 0; e < 6; ++e) {
+    const auto [a, b] = meshing::tet_edges[e];
+    control.row(4 + e) = 2 * nodes_.row(4 + e) - 0.5 * (nodes_.row(a) + nodes_.row(b));
+  }
+  const Eigen::Array3d below = control.colwise().minCoeff().transpose().array() - point.array();
+  const Eigen::Array3d above = point.array() - control.colwise().maxCoeff().transpose().array();
+  return below.max(above).max(0.0).matrix().norm();
 }
 
 CurvedPlace CurvedCell::find(const Eigen::Vector3d& point, const Eigen::Vector4d& start) const {

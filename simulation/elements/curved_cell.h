@@ -25,6 +25,9 @@ class CurvedCell {
   /// The same; outside, the closest place of the cell.
   CurvedPlace find(const Eigen::Vector3d& point, const Eigen::Vector4d& start) const;
 
+  /// No part of the cell is closer to @p point: the distance of the box around the control points of its Bézier form.
+  double least_distance_mm(const Eigen::Vector3d& point) const;
+
   /// Shape functions at a place, continued from there along the cell's tangent map to @p point.
   Eigen::Matrix<double, 10, 1> weights(const Eigen::Vector3d& point, const Eigen::Vector4d& b) const;
 

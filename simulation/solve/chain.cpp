@@ -2,6 +2,7 @@
 #include "simulation/solve/chain.h"
 
 #include <fmt/format.h>
+#include <omp.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <numbers>
 
 #include "common/error.h"
+#include "common/side_by_side.h"
 #include "simulation/model_fields.h"
 #include "simulation/solve/folds.h"
 #include "simulation/solve/overlap.h"
@@ -22,6 +24,9 @@ constexpr int max_corrections = 60;               // of the fixed point: linear 
 constexpr double correction_tolerance_mm = 1e-3;  // of the fixed point: far under what a scanner measures
 constexpr double second_shape_bound_mm = 1e-3;    // two balanced shapes this close are one
 constexpr double kg_mm3_per_kg_m3 = 1e-9;
+
+/// Dofs. Beyond this a factor takes a gigabyte and more, and the loops over elements and the products fill all threads.
+constexpr Eigen::Index largest_side_by_side = 60'000;
 
 /// Of gravity from the chest's front or back, prone and supine: breasts face up to some 45 degrees to the side.
 constexpr double widest_deg = 75;
@@ -130,18 +135,37 @@ SolveOptions work_of(SolveOptions options, const PoseLoad& imaged) {
 
 Chain::Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
              std::vector<PoseLoad> poses, SolveOptions options)
-    : poses_(std::move(poses)),
-      mechanics_(mesh, anatomy, model),
-      solver_(mechanics_, work_of(std::move(options), poses_.at(0))) {
+    : poses_(std::move(poses)), options_(work_of(std::move(options), poses_.at(0))) {
+  const bool apart = omp_get_max_threads() > 1 && mesh.points.size() <= largest_side_by_side;
+  workplaces_.resize(apart ? poses_.size() : 1);
+  workplaces_[0] = std::make_unique<Workplace>(mesh, anatomy, model, nullptr, options_);
   check_imaged_pose(poses_.at(0), anatomy);
   for (const PoseLoad& pose : poses_) check_supine_gravity(pose, anatomy);
 }
 
-Fields<Dual> Chain::fields(const Model& model, const PoseLoad& pose, const std::string& varied) const {
-  return make_fields(model, scene_of(mechanics_, pose.name), pose.gravity, varied);
+Chain::Workplace& Chain::workplace(std::size_t pose, const Model& model) {
+  if (workplaces_.size() == 1) return *workplaces_[0];
+  std::unique_ptr<Workplace>& place = workplaces_[pose];
+  if (!place)
+    place = std::make_unique<Workplace>(mechanics().mesh(), mechanics().anatomy(), model, &mechanics(), options_);
+  return *place;
 }
 
-void Chain::load(const Model& model, const PoseLoad& pose) { mechanics_.set_fields(values_of(fields(model, pose))); }
+/// Calls @p work of every pose from @p first on: side by side where each has a workplace.
+void Chain::each_pose(std::size_t first, const std::function<void(std::size_t pose)>& work) const {
+  std::vector<std::function<void()>> works;
+  for (std::size_t p = first; p < poses_.size(); ++p) works.emplace_back([&work, p] { work(p); });
+  if (workplaces_.size() > 1) return side_by_side(works);
+  for (const auto& one : works) one();
+}
+
+Fields<Dual> Chain::fields(const Model& model, const PoseLoad& pose, const std::string& varied) const {
+  return make_fields(model, scene_of(mechanics(), pose.name), pose.gravity, varied);
+}
+
+void Chain::load(Workplace& place, const Model& model, const PoseLoad& pose) const {
+  place.mechanics.set_fields(values_of(fields(model, pose)));
+}
 
 ChainSolution Chain::solve(const Model& model, const ChainSolution* near, InverseMethod method) {
   try {
@@ -152,84 +176,103 @@ ChainSolution Chain::solve(const Model& model, const ChainSolution* near, Invers
 }
 
 ChainSolution Chain::solve_all(const Model& model, const ChainSolution* near, InverseMethod method) {
-  const meshing::TetMesh& mesh = mechanics_.mesh();
-  solver_.forget();
+  const meshing::TetMesh& mesh = mechanics().mesh();
   ChainSolution solution;
   const Eigen::VectorXd offset = values_of(fields(model, poses_[0])).imaged_offset;
   solution.prone = mesh.points + Eigen::Map<const Points>(offset.data(), mesh.points.rows(), 3);
-  within_limit(solution, [&] { solve_undeformed(model, method, near, solution); });
+  solution.dearest_solve =
+      within_limit(workplaces_[0]->solver, [&] { solve_undeformed(model, method, near, solution); });
   check_cells(mesh, solution.prone, solution.X, "undeformed", solution.inverse);
   note_folds(mesh, solution.X, "undeformed", solution.inverse, solution.warnings);
+  std::vector<PoseSolution> poses(poses_.size());
+  std::vector<int> work(poses_.size());
+  each_pose(1, [&](std::size_t p) { poses[p] = solve_pose(model, p, near, solution, work[p]); });
   for (std::size_t p = 1; p < poses_.size(); ++p) {
-    load(model, poses_[p]);
-    Points start;
-    if (near != nullptr) start = pushed_forward(mesh.cells, near->poses[p - 1].x, near->X, solution.X);
-    PoseSolution pose{.name = poses_[p].name, .x = {}, .report = {}};
-    within_limit(solution, [&] {
-      pose.report = solve_pose(model, poses_[p], near != nullptr ? &start : nullptr, solution, pose.x);
-    });
-    check_cells(mesh, pose.x, solution.X, pose.name, pose.report);
-    note_folds(mesh, pose.x, pose.name, pose.report, solution.warnings);
-    solution.poses.push_back(std::move(pose));
+    note_folds(mesh, poses[p].x, poses[p].name, poses[p].report, solution.warnings);
+    solution.dearest_solve = std::max(solution.dearest_solve, work[p]);
+    solution.poses.push_back(std::move(poses[p]));
   }
   return solution;
 }
 
-/// One solve of a chain, no dearer than each may be.
-void Chain::within_limit(ChainSolution& solution, const std::function<void()>& solve) {
-  const int before = solver_.work();
-  solver_.limit_work(most_of_each_);
+/// @param work  out: what it cost
+PoseSolution Chain::solve_pose(const Model& model, std::size_t pose, const ChainSolution* near,
+                               const ChainSolution& solution, int& work) {
+  const meshing::TetMesh& mesh = mechanics().mesh();
+  PoseSolution found{.name = poses_[pose].name, .x = {}, .report = {}};
+  Points start;
+  if (near != nullptr) start = pushed_forward(mesh.cells, near->poses[pose - 1].x, near->X, solution.X);
+  work = within_limit(workplace(pose, model).solver, [&] {
+    found.report = find_pose(model, pose, near != nullptr ? &start : nullptr, solution, found.x);
+  });
+  check_cells(mesh, found.x, solution.X, found.name, found.report);
+  return found;
+}
+
+/// One solve of a chain, no dearer than each may be, from nothing that an earlier one has left behind.
+/// @return what it cost, as EquilibriumSolver::work()
+int Chain::within_limit(EquilibriumSolver& solver, const std::function<void()>& solve) const {
+  const int before = solver.work();
+  solver.forget();
+  solver.limit_work(most_of_each_);
   solve();
-  solution.dearest_solve = std::max(solution.dearest_solve, solver_.work() - before);
+  return solver.work() - before;
 }
 
 /// By growing load; where that leads nowhere, as the patient turns.
-SolveReport Chain::solve_pose(const Model& model, const PoseLoad& pose, const Points* start,
-                              const ChainSolution& solution, Points& x) {
+SolveReport Chain::find_pose(const Model& model, std::size_t pose, const Points* start, const ChainSolution& solution,
+                             Points& x) {
+  const PoseLoad& imaged = poses_[0];
+  const PoseLoad& wanted = poses_[pose];
+  Workplace& place = workplace(pose, model);
+  load(place, model, wanted);
   try {
-    return solver_.forward(solution.X, x, "undeformed → " + pose.name, start);
+    return place.solver.forward(solution.X, x, "undeformed → " + wanted.name, start);
   } catch (const NoEquilibrium&) {
-    if (most_of_each_ || imaged_free_of_load() || !(poses_[0].gravity.norm() > 0) || !(pose.gravity.norm() > 0)) throw;
-    const auto turned_load = [&](const Eigen::Vector3d& gravity) { load(model, {pose.name, gravity}); };
+    if (most_of_each_ || imaged_free_of_load() || !(imaged.gravity.norm() > 0) || !(wanted.gravity.norm() > 0)) throw;
+    const auto turned_load = [&](const Eigen::Vector3d& gravity) { load(place, model, {wanted.name, gravity}); };
     x = solution.prone;
-    const Turn turn = turn_of(mechanics_.anatomy(), poses_[0].gravity, pose.gravity);
+    const Turn turn = turn_of(place.mechanics.anatomy(), imaged.gravity, wanted.gravity);
     const std::optional<SolveReport> report =
-        turn_over(solver_, turn, turned_load, solution.X, x, poses_[0].name + ", turning, → " + pose.name);
+        turn_over(place.solver, turn, turned_load, solution.X, x, imaged.name + ", turning, → " + wanted.name);
     if (!report) throw;
     return *report;
   }
 }
 
 void Chain::certify(const Model& model, ChainSolution& solution) {
-  solver_.forget();
+  Workplace& place = *workplaces_[0];
+  place.solver.forget();
+  place.solver.limit_work(most_of_each_);
   look_for_contact(model, solution);
   solution.round_trip.name = poses_[0].name;
   if (imaged_free_of_load()) {
     solution.round_trip.x = solution.prone;
-    if (!mechanics_.has_energy()) look_for_second_shapes(model, solution);
+    if (!place.mechanics.has_energy()) look_for_second_shapes(model, solution);
     return;
   }
-  load(model, poses_[0]);
-  solution.round_trip.report = solver_.forward(solution.X, solution.round_trip.x, "undeformed → " + poses_[0].name);
+  load(place, model, poses_[0]);
+  solution.round_trip.report =
+      place.solver.forward(solution.X, solution.round_trip.x, "undeformed → " + poses_[0].name);
   const Eigen::VectorXd error = (solution.round_trip.x - solution.prone).rowwise().norm();
   solution.round_trip_max_mm = error.maxCoeff();
   solution.round_trip_rms_mm = std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
-  if (!mechanics_.has_energy()) look_for_second_shapes(model, solution);
+  if (!place.mechanics.has_energy()) look_for_second_shapes(model, solution);
 }
 
 void Chain::look_for_contact(const Model& model, ChainSolution& solution) {
-  const meshing::TetMesh& mesh = mechanics_.mesh();
-  const SkinContactTerm* contact = mechanics_.contact();
+  const meshing::TetMesh& mesh = mechanics().mesh();
+  const SkinContactTerm* contact = mechanics().contact();
   if (contact != nullptr) {
     if (!imaged_free_of_load()) note_left_out(contact->left_out_imaged(), poses_[0].name, solution.warnings);
     note_left_out(contact->left_out(solution.X), free_of_load, solution.warnings);
   }
-  const ChestContact* on_chest = mechanics_.chest_contact();
+  const ChestContact* on_chest = mechanics().chest_contact();
   if (on_chest != nullptr) {
     if (!imaged_free_of_load()) note_left_on_chest(on_chest->left_out_imaged(), poses_[0].name, solution.warnings);
     note_left_on_chest(on_chest->left_out(solution.X), free_of_load, solution.warnings);
   }
-  const Indices skin = mesh.faces(mechanics_.layout().skin.faces, Eigen::all);
+  const Indices skin = mesh.faces(mechanics().layout().skin.faces, Eigen::all);
   for (PoseSolution& pose : solution.poses) {
     if (contact != nullptr) pose.contact = contact->figures({.x = pose.x, .X = solution.X});
     if (on_chest != nullptr) pose.chest_contact = on_chest->figures({.x = pose.x, .X = solution.X});
@@ -242,7 +285,7 @@ void Chain::look_for_contact(const Model& model, ChainSolution& solution) {
 
 /// Warns of skin that lies in the chest beside the breast.
 void Chain::look_into_chest(const Model& model, const Indices& skin, ChainSolution& solution) const {
-  const std::optional<meshing::ChestBeside> chest = meshing::chest_beside(mechanics_.mesh(), mechanics_.anatomy());
+  const std::optional<meshing::ChestBeside> chest = meshing::chest_beside(mechanics().mesh(), mechanics().anatomy());
   if (!chest) return;
   for (const PoseSolution& pose : solution.poses) {
     const std::string warning = in_chest_warning(pose.name, find_in_chest(*chest, skin, pose.x), model.contact);
@@ -251,12 +294,13 @@ void Chain::look_into_chest(const Model& model, const Indices& skin, ChainSoluti
 }
 
 void Chain::look_for_second_shapes(const Model& model, ChainSolution& solution) {
+  Workplace& place = *workplaces_[0];
   for (std::size_t p = 1; p < poses_.size(); ++p) {
     PoseSolution& pose = solution.poses[p - 1];
-    load(model, poses_[p]);
+    load(place, model, poses_[p]);
     Points other;
     try {
-      solver_.forward(solution.X, other, poses_[0].name + " → " + pose.name, &solution.prone);
+      place.solver.forward(solution.X, other, poses_[0].name + " → " + pose.name, &solution.prone);
     } catch (const NumericalFailure&) {
       continue;  // that way leads nowhere: no second shape
     }
@@ -275,30 +319,32 @@ void Chain::look_for_second_shapes(const Model& model, ChainSolution& solution) 
 void Chain::solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near,
                              ChainSolution& solution) {
   const PoseLoad& prone = poses_[0];
+  Workplace& place = *workplaces_[0];
   if (imaged_free_of_load()) {
     solution.X = solution.prone;
     return;
   }
   const std::string way = prone.name + " → undeformed";
   if (method == InverseMethod::newton) {
-    load(model, prone);
+    load(place, model, prone);
     Points start;
     if (near != nullptr) start = solution.prone + (near->X - near->prone);
-    solution.inverse = solver_.inverse(solution.prone, solution.X, way, near != nullptr ? &start : nullptr);
+    solution.inverse = place.solver.inverse(solution.prone, solution.X, way, near != nullptr ? &start : nullptr);
     return;
   }
-  load(model, {.name = prone.name, .gravity = -prone.gravity});
-  solution.inverse = solver_.forward(solution.prone, solution.X, way + " (reversed gravity)");
+  load(place, model, {.name = prone.name, .gravity = -prone.gravity});
+  solution.inverse = place.solver.forward(solution.prone, solution.X, way + " (reversed gravity)");
   if (method == InverseMethod::fixed_point) correct_by_fixed_point(model, solution);
 }
 
 void Chain::correct_by_fixed_point(const Model& model, ChainSolution& solution) {
-  load(model, poses_[0]);
+  Workplace& place = *workplaces_[0];
+  load(place, model, poses_[0]);
   SolveReport& report = solution.inverse;
   double error = 0;
   for (int correction = 0; correction < max_corrections; ++correction) {
     Points x;
-    const SolveReport forward = solver_.forward(solution.X, x, poses_[0].name + " → undeformed (fixed point)");
+    const SolveReport forward = place.solver.forward(solution.X, x, poses_[0].name + " → undeformed (fixed point)");
     report.newton_iterations += forward.newton_iterations;
     report.factorisations += forward.factorisations;
     report.load_steps = forward.load_steps;

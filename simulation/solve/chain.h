@@ -66,7 +66,7 @@ class Chain {
 
   /// Whether the body was imaged free of load.
   bool imaged_free_of_load() const { return poses_[0].name == free_of_load; }
-  const Mechanics& mechanics() const { return mechanics_; }
+  const Mechanics& mechanics() const { return workplaces_[0]->mechanics; }
   const std::vector<PoseLoad>& poses() const { return poses_; }
 
   /// @param model  of the kind given to the constructor: numbers and effects may differ
@@ -81,10 +81,7 @@ class Chain {
 
   /// EquilibriumSolver::limit_work() of each solve of a chain: a trial of which one costs much more than any of others
   /// is not worth waiting for, nor for the body to be turned where growing load led nowhere. nullopt = no bound.
-  void limit_each_solve(std::optional<int> most) {
-    most_of_each_ = most;
-    solver_.limit_work(most);
-  }
+  void limit_each_solve(std::optional<int> most) { most_of_each_ = most; }
 
   /// Makes the round trip: loads solution.X with the imaged pose's gravity, from no load. Where forces have no energy
   /// it also looks for a second balanced shape of every pose. Notes what touches, and warns of skin that passes through
@@ -98,11 +95,27 @@ class Chain {
 
  private:
   friend class Sensitivities;
+
+  /// What a pose is solved with. The solvers of Sensitivities that are gone stay: analysed once, ready for the next.
+  struct Workplace {
+    Workplace(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
+              const Mechanics* same_mesh, const SolveOptions& options)
+        : mechanics(mesh, anatomy, model, same_mesh), solver(mechanics, options) {}
+    Mechanics mechanics;
+    EquilibriumSolver solver;
+    std::vector<std::unique_ptr<CholeskySolver>> spare_cholesky;
+    std::vector<std::unique_ptr<LuSolver>> spare_lu;
+  };
+
+  Workplace& workplace(std::size_t pose, const Model& model);
+  void each_pose(std::size_t first, const std::function<void(std::size_t pose)>& work) const;
   ChainSolution solve_all(const Model& model, const ChainSolution* near, InverseMethod method);
-  void load(const Model& model, const PoseLoad& pose);
-  void within_limit(ChainSolution& solution, const std::function<void()>& solve);
-  SolveReport solve_pose(const Model& model, const PoseLoad& pose, const Points* start, const ChainSolution& solution,
-                         Points& x);
+  PoseSolution solve_pose(const Model& model, std::size_t pose, const ChainSolution* near,
+                          const ChainSolution& solution, int& work);
+  SolveReport find_pose(const Model& model, std::size_t pose, const Points* start, const ChainSolution& solution,
+                        Points& x);
+  void load(Workplace& place, const Model& model, const PoseLoad& pose) const;
+  int within_limit(EquilibriumSolver& solver, const std::function<void()>& solve) const;
   void solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);
   void correct_by_fixed_point(const Model& model, ChainSolution& solution);
   void look_for_contact(const Model& model, ChainSolution& solution);
@@ -110,12 +123,10 @@ class Chain {
   void look_for_second_shapes(const Model& model, ChainSolution& solution);
 
   std::vector<PoseLoad> poses_;
-  Mechanics mechanics_;
-  EquilibriumSolver solver_;
+  SolveOptions options_;
+  // One of each pose, made when it is first needed, so that poses are solved side by side; or one for all.
+  std::vector<std::unique_ptr<Workplace>> workplaces_;
   std::optional<int> most_of_each_;
-  // Of Sensitivities that are gone: analysed once, ready for the next.
-  std::vector<std::unique_ptr<CholeskySolver>> spare_cholesky_;
-  std::vector<std::unique_ptr<LuSolver>> spare_lu_;
 };
 
 /// A chain used once, with its round trip and with effects that can change nothing refused. Parameters and errors as of

@@ -20,7 +20,8 @@ struct SolveOptions {
   double step_tolerance_mm = 1e-8;        ///< of Termination::step_small, >= 0
   double residual_tolerance = 1e-11;      ///< of Termination::residual_small, share of the weight, >= 0
   double smallest_load_step = 1.0 / 128;  ///< share of the load, in (0, 1]
-  /// Told at every iteration which solve is under way; may be empty.
+  /// Told at every iteration which solve is under way; may be empty. Each pose of a Chain has a copy, and several may
+  /// be called at the same time.
   std::function<void(const std::string& what, double load, int iteration, double residual_share)> progress;
 };
 

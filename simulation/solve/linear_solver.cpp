@@ -2,9 +2,12 @@
 #include "simulation/solve/linear_solver.h"
 
 #include <omp.h>
+#include <umfpack.h>
 
 #include <Eigen/CholmodSupport>
-#include <Eigen/UmfPackSupport>
+#include <algorithm>
+#include <deque>
+#include <utility>
 #include <vector>
 
 #include "common/error.h"
@@ -80,30 +83,59 @@ cholmod_sparse lower_view(const SparseMatrix& matrix) {
   return view;
 }
 
-/// Fill-reducing order of the nodes, three consecutive dofs each: ordering the graph of the nodes takes a ninth of the
-/// work that ordering the dofs takes.
-std::vector<int> node_ordering(const SparseMatrix& matrix, cholmod_common& common) {
+/// Which nodes of a body are coupled, three consecutive dofs each: the lower triangle by columns.
+struct NodeGraph {
+  std::vector<int> first, rows;
+  bool operator==(const NodeGraph&) const = default;
+};
+
+NodeGraph node_graph(const SparseMatrix& matrix) {
   const int nodes = static_cast<int>(matrix.cols() / 3);
-  std::vector<int> first(nodes + 1, 0), rows;
+  NodeGraph graph{std::vector<int>(nodes + 1, 0), {}};
   for (int n = 0; n < nodes; ++n) {
     for (SparseMatrix::InnerIterator entry(matrix, 3 * n); entry; ++entry)
-      if (entry.row() % 3 == 0 && entry.row() / 3 >= n) rows.push_back(static_cast<int>(entry.row() / 3));
-    first[n + 1] = static_cast<int>(rows.size());
+      if (entry.row() % 3 == 0 && entry.row() / 3 >= n) graph.rows.push_back(static_cast<int>(entry.row() / 3));
+    graph.first[n + 1] = static_cast<int>(graph.rows.size());
   }
+  return graph;
+}
+
+/// Fill-reducing order of the dofs: ordering the graph of the nodes takes a ninth of the work that ordering the dofs
+/// takes.
+std::vector<int> ordered(NodeGraph& nodes) {
+  cholmod_common common;
+  cholmod_start(&common);
+  common.print = 0;
+  const std::size_t count = nodes.first.size() - 1;
   cholmod_sparse graph{};
-  graph.nrow = graph.ncol = static_cast<std::size_t>(nodes);
-  graph.nzmax = rows.size();
-  graph.p = first.data();
-  graph.i = rows.data();
+  graph.nrow = graph.ncol = count;
+  graph.nzmax = nodes.rows.size();
+  graph.p = nodes.first.data();
+  graph.i = nodes.rows.data();
   graph.stype = lower_triangle;
   graph.itype = CHOLMOD_INT;
   graph.xtype = CHOLMOD_PATTERN;
   graph.sorted = graph.packed = 1;
-  std::vector<int> node_order(nodes), order(3 * static_cast<std::size_t>(nodes));
-  if (!cholmod_metis(&graph, nullptr, 0, true, node_order.data(), &common))
-    throw NumericalFailure("METIS could not order the mesh: out of memory?");
-  for (int n = 0; n < nodes; ++n)
-    for (int i = 0; i < 3; ++i) order[3 * static_cast<std::size_t>(n) + i] = 3 * node_order[n] + i;
+  std::vector<int> node_order(count), order(3 * count);
+  const bool found = cholmod_metis(&graph, nullptr, 0, true, node_order.data(), &common) != 0;
+  cholmod_finish(&common);
+  if (!found) throw NumericalFailure("METIS could not order the mesh: out of memory?");
+  for (std::size_t n = 0; n < count; ++n)
+    for (int i = 0; i < 3; ++i) order[3 * n + i] = 3 * node_order[n] + i;
+  return order;
+}
+
+/// ordered(), of meshes seen lately from memory: a diagnosis makes the body of one mesh dozens of times.
+std::vector<int> fill_reducing_order(const SparseMatrix& matrix) {
+  constexpr std::size_t most = 6;
+  static std::deque<std::pair<NodeGraph, std::vector<int>>> known;
+  NodeGraph graph = node_graph(matrix);
+  const std::lock_guard alone(shared_random);
+  for (const auto& [seen, order] : known)
+    if (seen == graph) return order;
+  std::vector<int> order = ordered(graph);
+  known.emplace_front(std::move(graph), order);
+  if (known.size() > most) known.pop_back();
   return order;
 }
 
@@ -112,8 +144,7 @@ std::vector<int> node_ordering(const SparseMatrix& matrix, cholmod_common& commo
 CholeskySolver::CholeskySolver(const SparseMatrix& pattern) : state_(std::make_unique<State>()) {
   use_one_blas_thread();
   const SingleThreaded guard;
-  const std::lock_guard alone(shared_random);
-  std::vector<int> order = node_ordering(pattern, state_->common);
+  std::vector<int> order = fill_reducing_order(pattern);
   state_->common.nmethods = 1;
   state_->common.method[0].ordering = CHOLMOD_GIVEN;
   cholmod_sparse view = lower_view(pattern);
@@ -144,51 +175,109 @@ void CholeskySolver::solve(const Eigen::VectorXd& right_hand_side, Eigen::Vector
   solution = Eigen::Map<const Eigen::VectorXd>(static_cast<const double*>(state_->solution->x), right_hand_side.size());
 }
 
-Eigen::VectorXd CholeskySolver::solve(const Eigen::VectorXd& right_hand_side) const {
-  Eigen::VectorXd solution(right_hand_side.size());
-  solve(right_hand_side, solution);
-  return solution;
+namespace {
+
+/// Work space of solves beside others.
+struct SolveSpace {
+  cholmod_common common;
+  cholmod_dense *solution = nullptr, *work1 = nullptr, *work2 = nullptr;
+
+  SolveSpace() { cholmod_start(&common); }
+  ~SolveSpace() {
+    for (cholmod_dense** dense : {&solution, &work1, &work2}) cholmod_free_dense(dense, &common);
+    cholmod_finish(&common);
+  }
+  SolveSpace(const SolveSpace&) = delete;
+  SolveSpace& operator=(const SolveSpace&) = delete;
+};
+
+}  // namespace
+
+Eigen::MatrixXd CholeskySolver::solve(const Eigen::MatrixXd& right_hand_sides) const {
+  constexpr Eigen::Index at_once = 16;  // of columns: enough for matrix products in place of products with vectors
+  Eigen::MatrixXd solutions(right_hand_sides.rows(), right_hand_sides.cols());
+  const auto blocks = (right_hand_sides.cols() + at_once - 1) / at_once;
+  bool solved = true;
+#pragma omp parallel if (blocks > 1)
+  {
+    const SingleThreaded guard;
+    SolveSpace space;
+#pragma omp for schedule(dynamic, 1) reduction(&& : solved)
+    for (Eigen::Index block = 0; block < blocks; ++block) {
+      const Eigen::Index first = block * at_once, count = std::min(at_once, right_hand_sides.cols() - first);
+      Eigen::Map<Eigen::MatrixXd> columns(const_cast<double*>(right_hand_sides.col(first).data()),
+                                          right_hand_sides.rows(), count);
+      cholmod_dense b = Eigen::viewAsCholmod(columns);
+      const bool done = cholmod_solve2(CHOLMOD_A, state_->factor, &b, nullptr, &space.solution, nullptr, &space.work1,
+                                       &space.work2, &space.common) != 0;
+      solved = solved && done;
+      if (done)
+        solutions.middleCols(first, count) = Eigen::Map<const Eigen::MatrixXd>(
+            static_cast<const double*>(space.solution->x), right_hand_sides.rows(), count);
+    }
+  }
+  if (!solved) throw NumericalFailure("a solve ran out of memory: use fewer tetrahedra");
+  return solutions;
 }
 
 struct LuSolver::State {
-  struct Solver : Eigen::UmfPackLU<SparseMatrix> {
-    Eigen::VectorXd solve_system(int system, const Eigen::VectorXd& b) const {
-      Eigen::VectorXd x(b.size());
-      umfpack_di_solve(system, mp_matrix.outerIndexPtr(), mp_matrix.innerIndexPtr(), mp_matrix.valuePtr(), x.data(),
-                       b.data(), m_numeric, m_control.data(), nullptr);
-      return x;
-    }
-  } solver;
   SparseMatrix matrix;  // kept: UMFPACK wants it again for every solve
+  double control[UMFPACK_CONTROL];
+  void *symbolic = nullptr, *numeric = nullptr;
+
+  State() { umfpack_di_defaults(control); }
+  ~State() {
+    umfpack_di_free_numeric(&numeric);
+    umfpack_di_free_symbolic(&symbolic);
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  void solve_system(int system, const double* b, double* x) const {
+    umfpack_di_solve(system, matrix.outerIndexPtr(), matrix.innerIndexPtr(), matrix.valuePtr(), x, b, numeric, control,
+                     nullptr);
+  }
 };
 
 LuSolver::LuSolver(const SparseMatrix& pattern) : state_(std::make_unique<State>()) {
   use_one_blas_thread();
   // The pattern is symmetric and the diagonal strong: order for that.
-  state_->solver.umfpackControl()[UMFPACK_STRATEGY] = UMFPACK_STRATEGY_SYMMETRIC;
-  state_->solver.umfpackControl()[UMFPACK_ORDERING] = UMFPACK_ORDERING_METIS;
-  state_->solver.umfpackControl()[UMFPACK_IRSTEP] = 0;  // refinement triples the cost of a solve and is not needed
+  state_->control[UMFPACK_STRATEGY] = UMFPACK_STRATEGY_SYMMETRIC;
+  state_->control[UMFPACK_IRSTEP] = 0;  // refinement triples the cost of a solve and is not needed
   state_->matrix = pattern;
   // By the pattern alone: what comes out later must not depend on the numbers of the first matrix.
   state_->matrix.coeffs() = 1;
-  const std::lock_guard alone(shared_random);
-  state_->solver.analyzePattern(state_->matrix);
+  const std::vector<int> order = fill_reducing_order(pattern);
+  const SparseMatrix& m = state_->matrix;
+  const int size = static_cast<int>(m.cols());
+  if (umfpack_di_qsymbolic(size, size, m.outerIndexPtr(), m.innerIndexPtr(), m.valuePtr(), order.data(),
+                           &state_->symbolic, state_->control, nullptr) < 0)
+    throw NumericalFailure("UMFPACK could not analyse the mesh: out of memory?");
 }
 
 LuSolver::~LuSolver() = default;
 
 bool LuSolver::factorise(const SparseMatrix& matrix) {
   state_->matrix = matrix;
-  state_->solver.factorize(state_->matrix);
-  return state_->solver.info() == Eigen::Success;
+  state_->matrix.makeCompressed();
+  umfpack_di_free_numeric(&state_->numeric);
+  const SparseMatrix& m = state_->matrix;
+  return umfpack_di_numeric(m.outerIndexPtr(), m.innerIndexPtr(), m.valuePtr(), state_->symbolic, &state_->numeric,
+                            state_->control, nullptr) == UMFPACK_OK;
 }
 
-Eigen::VectorXd LuSolver::solve(const Eigen::VectorXd& right_hand_side) const {
-  return state_->solver.solve_system(UMFPACK_A, right_hand_side);
+Eigen::MatrixXd LuSolver::solve(const Eigen::MatrixXd& right_hand_sides) const {
+  Eigen::MatrixXd solutions(right_hand_sides.rows(), right_hand_sides.cols());
+#pragma omp parallel for schedule(dynamic, 1) if (right_hand_sides.cols() > 1)
+  for (Eigen::Index k = 0; k < right_hand_sides.cols(); ++k)
+    state_->solve_system(UMFPACK_A, right_hand_sides.col(k).data(), solutions.col(k).data());
+  return solutions;
 }
 
 Eigen::VectorXd LuSolver::solve_transposed(const Eigen::VectorXd& right_hand_side) const {
-  return state_->solver.solve_system(UMFPACK_At, right_hand_side);
+  Eigen::VectorXd solution(right_hand_side.size());
+  state_->solve_system(UMFPACK_At, right_hand_side.data(), solution.data());
+  return solution;
 }
 
 std::unique_ptr<SpdSolver> make_spd_solver(const SparseMatrix& pattern, [[maybe_unused]] const Points& nodes) {

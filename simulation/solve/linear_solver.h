@@ -21,7 +21,10 @@ class CholeskySolver : public SpdSolver {
   bool factorise(const SparseMatrix& matrix, double shift = 0) override;
   /// Not from two threads at once: the work space is the object's.
   void solve(const Eigen::VectorXd& right_hand_side, Eigen::VectorXd& solution) const override;
-  Eigen::VectorXd solve(const Eigen::VectorXd& right_hand_side) const;
+  /// Of every column of @p right_hand_sides, on all threads: a column costs a fraction of a solve by itself.
+  /// @return the same bytes for any number of threads
+  /// @throws NumericalFailure  out of memory
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& right_hand_sides) const;
   double solves_per_factor() const override;
   bool direct() const override { return true; }
 
@@ -34,14 +37,15 @@ class CholeskySolver : public SpdSolver {
 /// @pre  factorise() returned true before any solve
 class LuSolver {
  public:
-  /// @param pattern  square; values are not read
+  /// @param pattern  as CholeskySolver takes it
+  /// @throws NumericalFailure  out of memory
   explicit LuSolver(const SparseMatrix& pattern);
   ~LuSolver();
   /// @param matrix  with the pattern given to the constructor; copied
   /// @return false when the matrix is singular, or memory ran out
   bool factorise(const SparseMatrix& matrix);
-  /// A⁻¹ right_hand_side
-  Eigen::VectorXd solve(const Eigen::VectorXd& right_hand_side) const;
+  /// A⁻¹ of every column of @p right_hand_sides, on all threads.
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& right_hand_sides) const;
   /// A⁻ᵀ right_hand_side
   Eigen::VectorXd solve_transposed(const Eigen::VectorXd& right_hand_side) const;
 

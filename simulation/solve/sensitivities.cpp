@@ -59,9 +59,11 @@ class TangentSolver {
     }
     if (!done) throw NumericalFailure("the tangent at the solution of '" + pose + "' is singular: no sensitivities");
   }
-  Flat solve(const Flat& b) const { return cholesky_ ? (*cholesky_)->solve(b) : (*lu_)->solve(b); }
+  Eigen::MatrixXd solve(const Eigen::MatrixXd& b) const {
+    return cholesky_ ? (*cholesky_)->solve(b) : (*lu_)->solve(b);
+  }
   Flat solve_transposed(const Flat& b) const {
-    return cholesky_ ? (*cholesky_)->solve(b) : (*lu_)->solve_transposed(b);
+    return cholesky_ ? Flat((*cholesky_)->solve(Eigen::MatrixXd(b))) : (*lu_)->solve_transposed(b);
   }
 
  private:
@@ -84,15 +86,33 @@ struct Sensitivities::State {
   std::vector<SparseMatrix> reference_tangents;          // ∂r/∂X, per pose but prone
 
   State(Chain& c, const Model& m, const ChainSolution& s)
-      : chain(c), model(m), solution(s), sums(c.mechanics().pattern()) {}
+      : chain(c),
+        model(m),
+        solution(s),
+        sums(c.mechanics().pattern()),
+        tangents(c.poses().size() - 1),
+        reference_tangents(c.poses().size() - 1) {}
 
   simulation::State at(std::size_t pose) const {  // 0 is prone
     return {pose == 0 ? solution.prone : solution.poses[pose - 1].x, solution.X, 1.0};
   }
 
+  /// Tangents of a pose, factorised.
   void linearise(std::size_t pose) {
-    chain.load(model, chain.poses()[pose]);
-    chain.mechanics().evaluate(at(pose), Demand{.residual = true, .tangent = true, .reference_tangent = true}, sums);
+    if (pose == 0 && chain.imaged_free_of_load()) return;
+    Chain::Workplace& place = chain.workplace(pose, model);
+    chain.load(place, model, chain.poses()[pose]);
+    Sums there(place.mechanics.pattern());
+    place.mechanics.evaluate(at(pose), Demand{.residual = true, .tangent = true, .reference_tangent = true}, there);
+    if (pose > 0) {
+      tangents[pose - 1] = std::make_unique<TangentSolver>(
+          place.spare_cholesky, place.spare_lu, place.mechanics.has_energy(), there, chain.poses()[pose].name);
+      reference_tangents[pose - 1] = std::move(there.reference_tangent);
+      return;
+    }
+    prone_tangent = there.whole_tangent();
+    if (!inverse.emplace(place.spare_lu, there.reference_tangent)->factorise(there.reference_tangent))
+      throw NumericalFailure("the tangent of the undeformed shape is singular: no sensitivities");
   }
 
   /// ∂r/∂p of a pose with x and X held, and what moving the known shape does to its mass.
@@ -107,57 +127,78 @@ struct Sensitivities::State {
   }
 
   Flat force_derivative(std::size_t pose, const Fields<Dual>& fields, Points* prone_derivative) {
-    chain.mechanics_.set_fields(values_of(fields));
+    Mechanics& mechanics = chain.workplace(pose, model).mechanics;
+    mechanics.set_fields(values_of(fields));
     const Points imaged = shaped(derivatives_of(fields).imaged_offset);
-    chain.mechanics().parameter_derivative(at(pose), fields, sums);
+    mechanics.parameter_derivative(at(pose), fields, sums);
     if (prone_derivative != nullptr) *prone_derivative = imaged;
     return sums.residual;
   }
 
-  /// @param what  a parameter or a direction of the fields
+  /// @param whats  parameters or directions of the fields
   template <class What>
-  ChainDerivative derivative(const What& what) {
-    ChainDerivative result;
-    Flat force = force_derivative(0, what, &result.prone);
-    const Flat prone = flat(result.prone);
-    Flat undeformed = prone;  // of a body imaged free of load
-    if (inverse) {
-      if (!prone.isZero(0)) force += prone_tangent * prone;
-      undeformed = -(*inverse)->solve(force);
+  std::vector<ChainDerivative> derivatives(const std::vector<What>& whats) {
+    const auto count = static_cast<Eigen::Index>(whats.size());
+    std::vector<ChainDerivative> results(whats.size());
+    Eigen::MatrixXd undeformed(solution.X.size(), count);  // of a body imaged free of load that of prone
+    for (Eigen::Index k = 0; k < count; ++k) {
+      ChainDerivative& result = results[static_cast<std::size_t>(k)];
+      undeformed.col(k) = force_derivative(0, whats[static_cast<std::size_t>(k)], &result.prone);
+      const Flat prone = flat(result.prone);
+      if (!inverse)
+        undeformed.col(k) = prone;
+      else if (!prone.isZero(0))
+        undeformed.col(k) += prone_tangent * prone;
     }
-    result.X = shaped(undeformed);
+    if (inverse) undeformed = -(*inverse)->solve(undeformed);
+    for (Eigen::Index k = 0; k < count; ++k) results[static_cast<std::size_t>(k)].X = shaped(undeformed.col(k));
+    Eigen::MatrixXd pull(solution.X.size(), count);
     for (std::size_t p = 1; p < chain.poses().size(); ++p) {
-      const Flat pull = force_derivative(p, what, nullptr) + reference_tangents[p - 1] * undeformed;
-      result.poses.push_back(shaped(-tangents[p - 1]->solve(pull)));
+      for (Eigen::Index k = 0; k < count; ++k)
+        pull.col(k) = force_derivative(p, whats[static_cast<std::size_t>(k)], nullptr) +
+                      reference_tangents[p - 1] * undeformed.col(k);
+      const Eigen::MatrixXd moved = tangents[p - 1]->solve(pull);
+      for (Eigen::Index k = 0; k < count; ++k)
+        results[static_cast<std::size_t>(k)].poses.push_back(shaped(-moved.col(k)));
     }
-    return result;
+    return results;
   }
 };
 
 Sensitivities::Sensitivities(Chain& chain, const Model& model, const ChainSolution& solution)
     : state_(std::make_unique<State>(chain, model, solution)) {
-  State& s = *state_;
-  if (!chain.imaged_free_of_load()) s.linearise(0);
-  s.prone_tangent = s.sums.whole_tangent();
-  if (!chain.imaged_free_of_load() &&
-      !s.inverse.emplace(chain.spare_lu_, s.sums.reference_tangent)->factorise(s.sums.reference_tangent))
-    throw NumericalFailure("the tangent of the undeformed shape is singular: no sensitivities");
-  for (std::size_t p = 1; p < chain.poses().size(); ++p) {
-    s.linearise(p);
-    s.reference_tangents.push_back(s.sums.reference_tangent);
-    s.tangents.push_back(std::make_unique<TangentSolver>(
-        chain.spare_cholesky_, chain.spare_lu_, chain.mechanics().has_energy(), s.sums, chain.poses()[p].name));
-  }
+  chain.each_pose(0, [this](std::size_t pose) { state_->linearise(pose); });
 }
 
 Sensitivities::~Sensitivities() = default;
 
-ChainDerivative Sensitivities::of(const std::string& parameter) const { return state_->derivative(parameter); }
+ChainDerivative Sensitivities::of(const std::string& parameter) const {
+  return std::move(of(std::vector{parameter}).front());
+}
 
-ChainDerivative Sensitivities::along(const FieldDirection& direction) const { return state_->derivative(direction); }
+std::vector<ChainDerivative> Sensitivities::of(const std::vector<std::string>& parameters) const {
+  return state_->derivatives(parameters);
+}
+
+ChainDerivative Sensitivities::along(const FieldDirection& direction) const {
+  return std::move(along(std::vector{direction}).front());
+}
+
+std::vector<ChainDerivative> Sensitivities::along(const std::vector<FieldDirection>& directions) const {
+  return state_->derivatives(directions);
+}
+
+std::vector<Points> Sensitivities::moved_by(std::size_t pose, const std::vector<Eigen::VectorXd>& forces) const {
+  Eigen::MatrixXd all(state_->solution.X.size(), static_cast<Eigen::Index>(forces.size()));
+  for (std::size_t f = 0; f < forces.size(); ++f) all.col(static_cast<Eigen::Index>(f)) = forces[f];
+  const Eigen::MatrixXd moved = state_->tangents.at(pose)->solve(all);
+  std::vector<Points> moves;
+  for (Eigen::Index f = 0; f < moved.cols(); ++f) moves.push_back(shaped(moved.col(f)));
+  return moves;
+}
 
 Points Sensitivities::moved_by(std::size_t pose, const Eigen::VectorXd& force) const {
-  return shaped(state_->tangents.at(pose)->solve(force));
+  return std::move(moved_by(pose, std::vector{force}).front());
 }
 
 Eigen::VectorXd Sensitivities::gradient(const std::vector<Points>& by_pose,

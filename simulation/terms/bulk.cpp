@@ -134,8 +134,8 @@ SplitLambda<T> split_lambda(const BulkMaterial<T>& m) {
 }
 
 template <class Element>
-BulkTerm<Element>::BulkTerm(const Indices& cells, const Pattern& pattern, const BulkSettings& settings)
-    : elements_(cells, pattern), settings_(settings) {
+BulkTerm<Element>::BulkTerm(std::shared_ptr<const Elements> cells, const BulkSettings& settings)
+    : shared_(std::move(cells)), elements_(*shared_), settings_(settings) {
   if (settings.law == BulkLaw::corotational_qr && Element::nodes != 4)
     throw InputError(
         "breast.law = corotational_qr needs linear tetrahedra: make the mesh with --order 1, or use corotational");

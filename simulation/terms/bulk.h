@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -40,7 +41,7 @@ template <class Element>
 class BulkTerm : public Term, public VolumeStrainTerm {
  public:
   /// @throws InputError  corotational_qr on quadratic cells: the study defines it for linear ones
-  BulkTerm(const Indices& cells, const Pattern& pattern, const BulkSettings& settings);
+  BulkTerm(std::shared_ptr<const Elements> cells, const BulkSettings& settings);
 
   /// @throws InputError  mooney_rivlin with λ < 4 C01 in a cell: its volumetric energy would not be convex
   void set_fields(const Fields<double>& fields) override;
@@ -66,7 +67,8 @@ class BulkTerm : public Term, public VolumeStrainTerm {
   void add_cell_derivative(int e, const State& state, const CellMaterial<Dual>& material,
                            Local<Element::nodes>& local) const;
 
-  Elements elements_;
+  std::shared_ptr<const Elements> shared_;
+  const Elements& elements_;
   BulkSettings settings_;
   std::vector<CellMaterial<double>> material_;  // per cell
 };

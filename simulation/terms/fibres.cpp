@@ -50,9 +50,9 @@ struct Fibre {
 }  // namespace
 
 template <class Element>
-FibreTerm<Element>::FibreTerm(const Indices& cells, const Pattern& pattern,
+FibreTerm<Element>::FibreTerm(std::shared_ptr<const Elements> cells,
                               std::shared_ptr<const meshing::MuscleDistance> muscle)
-    : elements_(cells, pattern), muscle_(std::move(muscle)) {}
+    : shared_(std::move(cells)), elements_(*shared_), muscle_(std::move(muscle)) {}
 
 template <class Element>
 void FibreTerm<Element>::set_fields(const Fields<double>& fields) {

@@ -17,7 +17,7 @@ namespace supine::simulation {
 template <class Element>
 class FibreTerm : public Term {
  public:
-  FibreTerm(const Indices& cells, const Pattern& pattern, std::shared_ptr<const meshing::MuscleDistance> muscle);
+  FibreTerm(std::shared_ptr<const Elements> cells, std::shared_ptr<const meshing::MuscleDistance> muscle);
 
   void set_fields(const Fields<double>& fields) override;
   void add(const State& state, const Demand& demand, Sums& sums) const override;
@@ -26,7 +26,8 @@ class FibreTerm : public Term {
  private:
   void add_all(const State& state, const Eigen::VectorXd& modulus, const Demand& demand, Sums& sums) const;
 
-  Elements elements_;
+  std::shared_ptr<const Elements> shared_;
+  const Elements& elements_;
   std::shared_ptr<const meshing::MuscleDistance> muscle_;
   Eigen::VectorXd modulus_;  // per cell, kPa
   bool any_ = false;

@@ -144,7 +144,7 @@ class BulkAlone : public ::testing::Test {
   Sums evaluate(const testing::TestScene& scene, const BulkSettings& settings, double poisson, double shape = 0,
                 double stretch = 1.1) {
     const Pattern pattern(scene.mesh.cells, scene.mesh.points.rows());
-    BulkTerm<Element> term(scene.mesh.cells, pattern, settings);
+    BulkTerm<Element> term(std::make_shared<const Elements>(scene.mesh.cells, pattern), settings);
     const auto column = [&scene](double value) -> Eigen::VectorXd {
       return Eigen::VectorXd::Constant(scene.mesh.cells.rows(), value);
     };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include <gtest/gtest.h>
+#include <omp.h>
 
 #include <limits>
 
@@ -54,6 +55,33 @@ TEST_F(LinearSolversTest, LuSolvesBothWays) {
   ASSERT_TRUE(solver.factorise(sums->reference_tangent));
   EXPECT_LT((sums->reference_tangent * solver.solve(b) - b).norm(), 1e-9 * b.norm());
   EXPECT_LT((sums->reference_tangent.transpose() * solver.solve_transposed(b) - b).norm(), 1e-9 * b.norm());
+}
+
+TEST_F(LinearSolversTest, ManyAtATimeAreThoseOneByOne) {
+  const Eigen::MatrixXd many = testing::random_matrix(static_cast<int>(b.size()), 37, 6);
+  CholeskySolver cholesky(sums->tangent);
+  ASSERT_TRUE(cholesky.factorise(sums->tangent));
+  LuSolver lu(sums->reference_tangent);
+  ASSERT_TRUE(lu.factorise(sums->reference_tangent));
+  const Eigen::MatrixXd by_cholesky = cholesky.solve(many), by_lu = lu.solve(many);
+  for (const Eigen::Index k : {0, 15, 16, 36}) {
+    const Eigen::VectorXd one = cholesky.solve(many.col(k)), other = lu.solve(many.col(k));
+    EXPECT_LT((by_cholesky.col(k) - one).norm(), 1e-12 * one.norm());
+    EXPECT_LT((by_lu.col(k) - other).norm(), 1e-12 * other.norm());
+  }
+}
+
+TEST_F(LinearSolversTest, ManyAtATimeAreTheSameForAnyNumberOfThreads) {
+  const Eigen::MatrixXd many = testing::random_matrix(static_cast<int>(b.size()), 37, 6);
+  CholeskySolver cholesky(sums->tangent);
+  ASSERT_TRUE(cholesky.factorise(sums->tangent));
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const Eigen::MatrixXd alone = cholesky.solve(many);
+  omp_set_num_threads(3);
+  const Eigen::MatrixXd together = cholesky.solve(many);
+  omp_set_num_threads(before);
+  EXPECT_EQ(alone, together);
 }
 
 TEST_F(LinearSolversTest, KrylovReachesTheAskedTolerance) {

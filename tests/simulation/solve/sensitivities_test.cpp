@@ -2,6 +2,7 @@
 #include "simulation/solve/sensitivities.h"
 
 #include <gtest/gtest.h>
+#include <omp.h>
 
 #include "simulation/laws/bulk_laws.h"
 #include "simulation/parameters.h"
@@ -116,6 +117,39 @@ TEST_P(SensitivitiesTest, EveryParameterPassesATaylorTestThroughBothSolves) {
     EXPECT_GT(order, 1.9) << name << ", largest " << size << " mm per unit";
   }
   EXPECT_GE(moving, GetParam().order == 2 ? 6 : 20);
+}
+
+TEST_P(SensitivitiesTest, AreTheSameForAnyNumberOfThreads) {
+  const std::vector<std::string> names = {"breast.young_modulus_kpa", "gravity_tilt.roll_rad"};
+  const int before = omp_get_max_threads();
+  std::vector<Eigen::VectorXd> shapes, slopes;
+  for (const int threads : {1, 3}) {
+    omp_set_num_threads(threads);
+    Chain one(scene.mesh, scene.anatomy, model, poses);
+    const ChainSolution there = one.solve(model);
+    shapes.push_back(stacked(there));
+    const Sensitivities sensitivities(one, model, there);
+    for (const ChainDerivative& derivative : sensitivities.of(names)) slopes.push_back(stacked(derivative));
+  }
+  omp_set_num_threads(before);
+  EXPECT_EQ(shapes[0], shapes[1]);
+  EXPECT_EQ(slopes[0], slopes[2]);
+  EXPECT_EQ(slopes[1], slopes[3]);
+}
+
+TEST_P(SensitivitiesTest, ManyAtATimeAreThoseOneByOne) {
+  const Sensitivities sensitivities(*chain, model, solution);
+  const std::vector<std::string> names = {"skin.young_modulus_kpa", "segmentation_offset.offset_mm"};
+  const std::vector<ChainDerivative> many = sensitivities.of(names);
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const Eigen::VectorXd one = stacked(sensitivities.of(names[k]));
+    EXPECT_LT((stacked(many[k]) - one).norm(), 1e-10 * one.norm()) << names[k];
+    EXPECT_EQ(many[k].prone, sensitivities.of(names[k]).prone);
+  }
+  const Eigen::VectorXd force = testing::random_matrix(static_cast<int>(solution.X.size()), 1, 3);
+  const std::vector<Points> moved = sensitivities.moved_by(1, std::vector<Eigen::VectorXd>{force, -2 * force});
+  EXPECT_LT((moved[0] - sensitivities.moved_by(1, force)).norm(), 1e-10 * moved[0].norm());
+  EXPECT_LT((moved[1] + 2 * moved[0]).norm(), 1e-10 * moved[0].norm());
 }
 
 TEST_P(SensitivitiesTest, HoldsWithATensionFieldToo) {

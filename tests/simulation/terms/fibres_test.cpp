@@ -20,7 +20,7 @@ class Fibres {
   Fibres(const testing::TestScene& scene, double modulus_kpa)
       : pattern_(scene.mesh.cells, scene.mesh.points.rows()),
         sums(pattern_),
-        term_(scene.mesh.cells, pattern_, scene.anatomy.muscle) {
+        term_(std::make_shared<const Elements>(scene.mesh.cells, pattern_), scene.anatomy.muscle) {
     Fields<double> fields;
     fields.fibre_modulus = Eigen::VectorXd::Constant(scene.mesh.cells.rows(), modulus_kpa);
     term_.set_fields(fields);

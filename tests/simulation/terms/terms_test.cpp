@@ -136,7 +136,7 @@ template <class Element>
 Eigen::MatrixXd tissue_tangent(const Indices& cells, const Model& model, const Fields<Dual>& fields, const State& state,
                                bool convex) {
   const Pattern pattern(cells, state.X.rows());
-  BulkTerm<Element> tissue(cells, pattern, {.law = model.breast.law});
+  BulkTerm<Element> tissue(std::make_shared<const Elements>(cells, pattern), {.law = model.breast.law});
   tissue.set_fields(values_of(fields));
   Sums sums(pattern);
   tissue.add(state, Demand{.residual = true, .tangent = true, .convex = convex}, sums);
