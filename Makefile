@@ -107,7 +107,7 @@ build-sanitize/build.ninja build-sanitize-threads/build.ninja: | clang
 # Executables; none: every test there is.
 sanitized = $(or $(SANITIZE),$(if $(filter sanitize-threads,$@),$(sanitize_threads),$(if $(SHORT),$(sanitize_short))))
 sanitize_short := test_common test_reconstruction test_segmentation
-sanitize_threads := test_reconstruction test_registration test_simulation test_segmentation test_meshing test_fitting test_warp test_diagnosis
+sanitize_threads := test_common test_reconstruction test_registration test_simulation test_segmentation test_meshing test_fitting test_warp test_diagnosis
 sanitize sanitize-threads: %: build-%/build.ninja
 	@source tests/sanitizers/options.sh && cmake --build build-$@ --parallel $(JOBS) --target $(or $(sanitized),tests/all tools)
 	@tests/sanitizers/run.sh build-$@ $(if $(SHORT),--short) $(sanitized)

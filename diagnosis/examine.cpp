@@ -11,6 +11,7 @@
 #include "common/statistics.h"
 #include "diagnosis/evidence/left_out.h"
 #include "diagnosis/evidence/local_fit.h"
+#include "diagnosis/evidence/mesh_doubt.h"
 #include "diagnosis/follow.h"
 #include "diagnosis/stand_in.h"
 #include "simulation/parameters.h"
@@ -88,30 +89,45 @@ void find_unexplained(unsigned seed, Findings& found) {
   found.unexplained = summary(all);
 }
 
-/// Where a scan lies by the likeliest hypothesis: its own nuisances and what an effect adds to them.
-std::vector<ScanPlace> find_places(const Subject& subject, const Findings& found) {
-  const Hypothesis& h = found.hypotheses.front();
+/// One number of a scan's place by a hypothesis: its own nuisance and what an effect adds to it.
+Known place_by(const Hypothesis& h, const std::string& pose, const std::string& number, bool mesh_errs) {
   const Directions& all = h.evidence->directions();
+  VectorXd weights = VectorXd::Zero(static_cast<Index>(h.rows.size()));
+  double stands = 0, believed = 0;
+  for (const std::string& name : {pose + "/" + number, number}) {
+    const int k = h.place_of(name);
+    if (k < 0) continue;
+    const int direction = h.rows[static_cast<std::size_t>(k)];
+    weights[k] = all.unit[direction];
+    stands += all.stands[direction];
+    believed += std::pow(all.unit[direction] * all.sd[direction], 2);
+  }
+  const auto [offset, sd] = h.weighed.sum(weights);
+  const Known known{stands + offset, sd};
+  return mesh_errs && sd > 0 ? with_doubt(known, {0, std::sqrt(believed)}, mesh_doubt(number)) : known;
+}
+
+/// Where a scan lies, by the hypotheses as far as they are likely.
+std::vector<ScanPlace> find_places(const Subject& subject, const Findings& found) {
+  constexpr double worth_asking = 0.01;  // of the likeliest one's probability
   const simulation::Effect& place = simulation::place_of_scan();
   std::vector<ScanPlace> places;
   for (const auto* measurement : subject.scene.measurements) {
     ScanPlace at{measurement->pose.name, {}, {}, {}};
     for (int i = 0; i < 6; ++i) {
-      const auto& row = place.parameters()[static_cast<std::size_t>(i)];
-      const std::string of_model = simulation::parameter_name(place, row);
-      VectorXd weights = VectorXd::Zero(static_cast<Index>(h.rows.size()));
-      double stands = 0;
-      for (const std::string& name : {at.pose + "/" + of_model, of_model}) {
-        const int k = h.place_of(name);
-        if (k < 0) continue;
-        const int direction = h.rows[static_cast<std::size_t>(k)];
-        weights[k] = all.unit[direction];
-        stands += all.stands[direction];
+      const std::string number = simulation::parameter_name(place, place.parameters()[static_cast<std::size_t>(i)]);
+      double weight = 0, mean = 0, square = 0;
+      for (const Hypothesis& h : found.hypotheses) {
+        if (!(h.probability >= worth_asking * found.hypotheses.front().probability)) continue;
+        const Known known = place_by(h, at.pose, number, found.base.numerical.has_value());
+        weight += h.probability;
+        mean += h.probability * known.mean;
+        square += h.probability * (known.mean * known.mean + known.sd * known.sd);
       }
-      const auto [offset, sd] = h.weighed.sum(weights);
+      mean /= weight;
       const double unit = i < 3 ? 1 : 180 / std::numbers::pi;
-      (i < 3 ? at.shift_mm : at.turn_deg)[i % 3] = unit * (stands + offset);
-      at.sd[i] = unit * sd;
+      (i < 3 ? at.shift_mm : at.turn_deg)[i % 3] = unit * mean;
+      at.sd[i] = unit * std::sqrt(std::max(square / weight - mean * mean, 0.0));
     }
     places.push_back(at);
   }

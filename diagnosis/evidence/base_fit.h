@@ -43,7 +43,8 @@ struct BaseFit : JointFit {
   double size_of(const Weighed& weighed) const;
 };
 
-/// The numbers of a base fit and of its nuisances, with what is left open of them.
+/// The numbers of a base fit and of its nuisances, with what is left open of them; with the mesh's error measured also
+/// what that leaves unsaid (mesh_doubt.h).
 struct JointPosterior {
   std::vector<std::string> names;  ///< free parameters, then nuisances
   Eigen::VectorXd value, sd;       ///< in their units; of a number of the base model that is never known its logarithm

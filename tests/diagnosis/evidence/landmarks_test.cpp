@@ -7,6 +7,7 @@
 
 #include "common/rms.h"
 #include "diagnosis/evidence/base_fit.h"
+#include "diagnosis/evidence/mesh_doubt.h"
 #include "diagnosis/evidence/nuisances.h"
 #include "diagnosis/weighted_fit.h"
 #include "simulation/parameters.h"
@@ -142,6 +143,41 @@ TEST(JointPosterior, HoldsTheTruthOfATwin) {
     EXPECT_NEAR(posterior.sd[k], unit * std::sqrt(posterior.of_parameters(k, k)), 1e-9 * posterior.sd[k]);
     EXPECT_NEAR(posterior.value[k], wanted, 3 * posterior.sd[k]) << posterior.names[row];
     EXPECT_LT(posterior.sd[k], wanted) << "something is known of it";
+  }
+}
+
+TEST(JointPosterior, IsWiderByWhatTheMeshDoes) {
+  const Marked marked(0.5);
+  const simulation::Model start = supine::testing::twin_start();
+  calibration::Evaluator evaluator(marked.scene(), start, accurate_enough());
+  BaseFitOptions options;
+  options.other_meshes = false;
+  BaseFit base = fit_base_model(evaluator, start, start, {0.3}, nullptr, options);
+  const JointPosterior exact = posterior_of(base);
+  base.numerical.emplace();  // another mesh that shows nothing
+  const JointPosterior allowed = posterior_of(base);
+  const Eigen::VectorXd unit = base.parameters->slope(base.fit.u);
+  int wider = 0;
+  for (Eigen::Index k = 0; k < exact.sd.size(); ++k) {
+    const std::string& name = exact.names[static_cast<std::size_t>(k)];
+    const double doubt = mesh_doubt(name.substr(name.find('/') + 1));
+    if (!(doubt > 0)) {
+      EXPECT_EQ(allowed.sd[k], exact.sd[k]) << name;
+      continue;
+    }
+    ++wider;
+    const bool modulus = k < exact.of_parameters.rows();
+    const double added = modulus ? doubt * std::abs(unit[k]) : doubt;
+    EXPECT_GT(allowed.sd[k], exact.sd[k]) << name;
+    EXPECT_LT(allowed.sd[k], 1.001 * std::hypot(exact.sd[k], added)) << name;
+    if (modulus) {
+      EXPECT_EQ(allowed.value[k], exact.value[k]) << name;
+    }
+  }
+  EXPECT_GE(wider, 7) << "a modulus and six numbers of a scan's place";
+  const auto correlation = [](const Eigen::MatrixXd& c) { return c(0, 1) / std::sqrt(c(0, 0) * c(1, 1)); };
+  if (exact.of_parameters.rows() > 1) {
+    EXPECT_NEAR(correlation(allowed.of_parameters), correlation(exact.of_parameters), 1e-12);
   }
 }
 
