@@ -116,18 +116,14 @@ std::vector<ScanPlace> find_places(const Subject& subject, const Findings& found
     ScanPlace at{measurement->pose.name, {}, {}, {}};
     for (int i = 0; i < 6; ++i) {
       const std::string number = simulation::parameter_name(place, place.parameters()[static_cast<std::size_t>(i)]);
-      double weight = 0, mean = 0, square = 0;
-      for (const Hypothesis& h : found.hypotheses) {
-        if (!(h.probability >= worth_asking * found.hypotheses.front().probability)) continue;
-        const Known known = place_by(h, at.pose, number, found.base.numerical.has_value());
-        weight += h.probability;
-        mean += h.probability * known.mean;
-        square += h.probability * (known.mean * known.mean + known.sd * known.sd);
-      }
-      mean /= weight;
+      std::vector<std::pair<double, Known>> each;
+      for (const Hypothesis& h : found.hypotheses)
+        if (h.probability >= worth_asking * found.hypotheses.front().probability)
+          each.emplace_back(h.probability, place_by(h, at.pose, number, found.base.numerical.has_value()));
+      const Known known = mixed(each);
       const double unit = i < 3 ? 1 : 180 / std::numbers::pi;
-      (i < 3 ? at.shift_mm : at.turn_deg)[i % 3] = unit * mean;
-      at.sd[i] = unit * std::sqrt(std::max(square / weight - mean * mean, 0.0));
+      (i < 3 ? at.shift_mm : at.turn_deg)[i % 3] = unit * known.mean;
+      at.sd[i] = unit * known.sd;
     }
     places.push_back(at);
   }

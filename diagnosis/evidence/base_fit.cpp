@@ -162,6 +162,27 @@ void find_errors(Evaluator& evaluator, JointFitter& fitter, const Priors& priors
   add_up_errors(evaluator, priors, base);
 }
 
+/// Parameters stay where they were fitted, and go together as they did.
+void allow_for_mesh(const FreeParameters& parameters, const Directions& all, JointPosterior& found) {
+  const Index moduli = found.of_parameters.rows();
+  VectorXd wider = VectorXd::Ones(moduli);
+  for (Index k = 0; k < all.size(); ++k) {
+    const std::string& name = all.names[static_cast<std::size_t>(k)];
+    const double doubt = mesh_doubt(name.substr(name.find('/') + 1));  // of a nuisance behind its pose
+    const double believed = std::abs(all.unit[k]) * all.sd[k];
+    if (!(doubt > 0) || !(found.sd[k] > 0)) continue;
+    const double sd = found.sd[k];
+    if (k >= moduli) {
+      const Known known = with_doubt({found.value[k], sd}, {0, believed}, doubt);
+      found.value[k] = known.mean, found.sd[k] = known.sd;
+    } else if (parameters.is_log(k)) {
+      found.sd[k] = with_doubt({0, sd}, {0, believed}, std::abs(all.unit[k]) * doubt).sd;
+      wider[k] = found.sd[k] / sd;
+    }
+  }
+  found.of_parameters = wider.asDiagonal() * found.of_parameters * wider.asDiagonal();
+}
+
 VectorXd coordinates_of(const FreeParameters& parameters, const simulation::Model& start) {
   VectorXd u = parameters.start();
   simulation::Model from = start;
@@ -190,31 +211,6 @@ Directions directions_at(const calibration::Fit& fit, const FreeParameters& para
             nuisance.sigma);
   return all;
 }
-
-namespace {
-
-/// Parameters stay where they were fitted, and go together as they did.
-void allow_for_mesh(const FreeParameters& parameters, const Directions& all, JointPosterior& found) {
-  const Index moduli = found.of_parameters.rows();
-  VectorXd wider = VectorXd::Ones(moduli);
-  for (Index k = 0; k < all.size(); ++k) {
-    const std::string& name = all.names[static_cast<std::size_t>(k)];
-    const double doubt = mesh_doubt(name.substr(name.find('/') + 1));  // of a nuisance behind its pose
-    const double believed = std::abs(all.unit[k]) * all.sd[k];
-    if (!(doubt > 0) || !(found.sd[k] > 0)) continue;
-    const double sd = found.sd[k];
-    if (k >= moduli) {
-      const Known known = with_doubt({found.value[k], sd}, {0, believed}, doubt);
-      found.value[k] = known.mean, found.sd[k] = known.sd;
-    } else if (parameters.is_log(k)) {
-      found.sd[k] = with_doubt({0, sd}, {0, believed}, std::abs(all.unit[k]) * doubt).sd;
-      wider[k] = found.sd[k] / sd;
-    }
-  }
-  found.of_parameters = wider.asDiagonal() * found.of_parameters * wider.asDiagonal();
-}
-
-}  // namespace
 
 JointPosterior posterior_of(const BaseFit& base) {
   const LinearEvidence evidence = evidence_at(base);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "diagnosis/evidence/mesh_doubt.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -16,6 +17,17 @@ double mesh_doubt(const std::string& parameter) {
   for (const simulation::Parameter& row : place.parameters())
     if (parameter == simulation::parameter_name(place, row)) return row.unit == "rad" ? of_turn_rad : of_shift_mm;
   return 0;
+}
+
+Known mixed(const std::vector<std::pair<double, Known>>& each) {
+  double all = 0, mean = 0, square = 0;
+  for (const auto& [probability, known] : each) {
+    all += probability;
+    mean += probability * known.mean;
+    square += probability * (known.mean * known.mean + known.sd * known.sd);
+  }
+  mean /= all;
+  return {mean, std::sqrt(std::max(square / all - mean * mean, 0.0))};
 }
 
 Known with_doubt(const Known& found, const Known& believed, double doubt) {

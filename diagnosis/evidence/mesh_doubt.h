@@ -2,6 +2,8 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace supine::diagnosis {
 
@@ -9,6 +11,10 @@ namespace supine::diagnosis {
 struct Known {
   double mean, sd;
 };
+
+/// A number of which one of several things is known: mean and standard deviation of the mixture.
+/// @param each  probability, up to a factor for all, and what is then known; at least one above zero
+Known mixed(const std::vector<std::pair<double, Known>>& each);
 
 /// What the mesh does to a number that is fitted, beyond what other meshes show and Σ holds: one standard deviation, of
 /// a modulus of its logarithm, of a scan's place in mm and radians; 0 of all else. Measured on computed breasts of an

@@ -11,11 +11,6 @@
 namespace supine::diagnosis {
 namespace {
 
-/// By the name that Sensitivities knows.
-std::string setting_of(const Nuisance& nuisance) {
-  return nuisance.effect.empty() ? nuisance.parameter : nuisance.effect + "." + nuisance.parameter;
-}
-
 using simulation::Effect;
 using simulation::EffectSetting;
 using simulation::Model;
@@ -98,7 +93,7 @@ void find_shapes(calibration::Evaluator& evaluator, const simulation::Sensitivit
     Eigen::VectorXd distances;
   };
   std::map<std::string, Slope> slopes;  // of what is another number in each pose, for all poses at once
-  for (const Nuisance& nuisance : nuisances) slopes[setting_of(nuisance)];
+  for (const Nuisance& nuisance : nuisances) slopes[nuisance.setting()];
   std::vector<std::string> names;
   for (const auto& [name, slope] : slopes) names.push_back(name);
   std::vector<simulation::ChainDerivative> motions = sensitivities.of(names);
@@ -110,7 +105,7 @@ void find_shapes(calibration::Evaluator& evaluator, const simulation::Sensitivit
   const auto& measurements = evaluator.scene().measurements;
   for (Nuisance& nuisance : nuisances) {
     const bool base = nuisance.effect.empty();
-    const std::string name = setting_of(nuisance);
+    const std::string name = nuisance.setting();
     const Slope& slope = slopes.at(name);
     nuisance.motion = slope.motion;
     nuisance.motion_per_sigma = nuisance.sigma * (base ? simulation::base_setting(model, name).value : 1);

@@ -25,8 +25,10 @@ struct Nuisance {
   std::shared_ptr<const simulation::ChainDerivative> motion{};
   double motion_per_sigma = 0;
 
+  /// As in parameters.h: "misregistration.shift_x_mm".
+  std::string setting() const { return (effect.empty() ? "" : effect + ".") + parameter; }
   /// "supine/misregistration.shift_x_mm"; of what is one for all poses "/gland_stiffness.log_ratio".
-  std::string name() const { return pose + "/" + (effect.empty() ? "" : effect + ".") + parameter; }
+  std::string name() const { return pose + "/" + setting(); }
 };
 
 /// The imaged pose, then the measured ones.

@@ -67,7 +67,7 @@ PointMoves moves_of(const PoseAt& at, const simulation::Embedding& points, const
     const Nuisance& nuisance = nuisances[k];
     if (!nuisance.pose.empty() && nuisance.pose != pose) continue;
     const bool base = nuisance.effect.empty();
-    const std::string name = base ? nuisance.parameter : nuisance.effect + "." + nuisance.parameter;
+    const std::string name = nuisance.setting();
     const double scale = nuisance.sigma * (base ? simulation::base_setting(at.model, name).value : 1);
     moves.nuisances.col(static_cast<Eigen::Index>(k)) = scale * moved(name);
   }

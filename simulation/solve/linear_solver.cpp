@@ -50,24 +50,45 @@ class SingleThreaded {
 
 }  // namespace
 
-struct CholeskySolver::State {
+namespace {
+
+/// What CHOLMOD works in, its space kept between solves.
+struct Cholmod {
   cholmod_common common;
-  cholmod_factor* factor = nullptr;
-  // Workspace of cholmod_solve2, kept between solves.
   cholmod_dense *solution = nullptr, *work1 = nullptr, *work2 = nullptr;
 
-  State() {
+  Cholmod() {
     cholmod_start(&common);
     common.print = 0;
+  }
+  ~Cholmod() {
+    for (cholmod_dense** dense : {&solution, &work1, &work2}) cholmod_free_dense(dense, &common);
+    cholmod_finish(&common);
+  }
+  Cholmod(const Cholmod&) = delete;
+  Cholmod& operator=(const Cholmod&) = delete;
+
+  /// @param b  #dofs by #columns, dense
+  /// @return false when memory ran out; else the solution is as large as @p b
+  bool solve(cholmod_factor* factor, cholmod_dense b) {
+    return cholmod_solve2(CHOLMOD_A, factor, &b, nullptr, &solution, nullptr, &work1, &work2, &common) != 0;
+  }
+  const double* values() const { return static_cast<const double*>(solution->x); }
+};
+
+}  // namespace
+
+struct CholeskySolver::State {
+  Cholmod own;
+  cholmod_common& common = own.common;
+  cholmod_factor* factor = nullptr;
+
+  State() {
     common.supernodal = CHOLMOD_SUPERNODAL;
     common.final_ll = true;
     common.quick_return_if_not_posdef = true;
   }
-  ~State() {
-    for (cholmod_dense** dense : {&solution, &work1, &work2}) cholmod_free_dense(dense, &common);
-    cholmod_free_factor(&factor, &common);
-    cholmod_finish(&common);
-  }
+  ~State() { cholmod_free_factor(&factor, &common); }
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 };
@@ -103,9 +124,7 @@ NodeGraph node_graph(const SparseMatrix& matrix) {
 /// Fill-reducing order of the dofs: ordering the graph of the nodes takes a ninth of the work that ordering the dofs
 /// takes.
 std::vector<int> ordered(NodeGraph& nodes) {
-  cholmod_common common;
-  cholmod_start(&common);
-  common.print = 0;
+  Cholmod cholmod;
   const std::size_t count = nodes.first.size() - 1;
   cholmod_sparse graph{};
   graph.nrow = graph.ncol = count;
@@ -117,8 +136,7 @@ std::vector<int> ordered(NodeGraph& nodes) {
   graph.xtype = CHOLMOD_PATTERN;
   graph.sorted = graph.packed = 1;
   std::vector<int> node_order(count), order(3 * count);
-  const bool found = cholmod_metis(&graph, nullptr, 0, true, node_order.data(), &common) != 0;
-  cholmod_finish(&common);
+  const bool found = cholmod_metis(&graph, nullptr, 0, true, node_order.data(), &cholmod.common) != 0;
   if (!found) throw NumericalFailure("METIS could not order the mesh: out of memory?");
   for (std::size_t n = 0; n < count; ++n)
     for (int i = 0; i < 3; ++i) order[3 * n + i] = 3 * node_order[n] + i;
@@ -169,29 +187,9 @@ bool CholeskySolver::factorise(const SparseMatrix& matrix, double shift) {
 
 void CholeskySolver::solve(const Eigen::VectorXd& right_hand_side, Eigen::VectorXd& solution) const {
   const SingleThreaded guard;
-  cholmod_dense b = Eigen::viewAsCholmod(const_cast<Eigen::VectorXd&>(right_hand_side));
-  cholmod_solve2(CHOLMOD_A, state_->factor, &b, nullptr, &state_->solution, nullptr, &state_->work1, &state_->work2,
-                 &state_->common);
-  solution = Eigen::Map<const Eigen::VectorXd>(static_cast<const double*>(state_->solution->x), right_hand_side.size());
+  state_->own.solve(state_->factor, Eigen::viewAsCholmod(const_cast<Eigen::VectorXd&>(right_hand_side)));
+  solution = Eigen::Map<const Eigen::VectorXd>(state_->own.values(), right_hand_side.size());
 }
-
-namespace {
-
-/// Work space of solves beside others.
-struct SolveSpace {
-  cholmod_common common;
-  cholmod_dense *solution = nullptr, *work1 = nullptr, *work2 = nullptr;
-
-  SolveSpace() { cholmod_start(&common); }
-  ~SolveSpace() {
-    for (cholmod_dense** dense : {&solution, &work1, &work2}) cholmod_free_dense(dense, &common);
-    cholmod_finish(&common);
-  }
-  SolveSpace(const SolveSpace&) = delete;
-  SolveSpace& operator=(const SolveSpace&) = delete;
-};
-
-}  // namespace
 
 Eigen::MatrixXd CholeskySolver::solve(const Eigen::MatrixXd& right_hand_sides) const {
   constexpr Eigen::Index at_once = 16;  // of columns: enough for matrix products in place of products with vectors
@@ -201,19 +199,16 @@ Eigen::MatrixXd CholeskySolver::solve(const Eigen::MatrixXd& right_hand_sides) c
 #pragma omp parallel if (blocks > 1)
   {
     const SingleThreaded guard;
-    SolveSpace space;
+    Cholmod space;
 #pragma omp for schedule(dynamic, 1) reduction(&& : solved)
     for (Eigen::Index block = 0; block < blocks; ++block) {
       const Eigen::Index first = block * at_once, count = std::min(at_once, right_hand_sides.cols() - first);
       Eigen::Map<Eigen::MatrixXd> columns(const_cast<double*>(right_hand_sides.col(first).data()),
                                           right_hand_sides.rows(), count);
-      cholmod_dense b = Eigen::viewAsCholmod(columns);
-      const bool done = cholmod_solve2(CHOLMOD_A, state_->factor, &b, nullptr, &space.solution, nullptr, &space.work1,
-                                       &space.work2, &space.common) != 0;
+      const bool done = space.solve(state_->factor, Eigen::viewAsCholmod(columns));
       solved = solved && done;
       if (done)
-        solutions.middleCols(first, count) = Eigen::Map<const Eigen::MatrixXd>(
-            static_cast<const double*>(space.solution->x), right_hand_sides.rows(), count);
+        solutions.middleCols(first, count) = Eigen::Map<const Eigen::MatrixXd>(space.values(), solutions.rows(), count);
     }
   }
   if (!solved) throw NumericalFailure("a solve ran out of memory: use fewer tetrahedra");

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "simulation/elements/curved_cell.h"
 #include "tests/simulation/scene.h"
 #include "tests/support/shapes.h"
 #include "tests/support/taylor.h"
@@ -54,6 +55,24 @@ TEST_P(EmbeddingTest, SaysHowFarOutsideAPointLies) {
   EXPECT_NEAR(outside[0], 0, 1e-9);
   EXPECT_NEAR(outside[1], 1.5, 1e-6);
   EXPECT_NEAR(outside[2], 5, 1e-6);
+}
+
+// A cell that is passed over because of its least distance would have been no nearer.
+TEST(CurvedCell, IsNoNearerThanItsLeastDistance) {
+  meshing::TetMesh mesh = testing::quadratic(testing::box_mesh(2, 2, 2, {size_mm, size_mm, size_mm}));
+  mesh.points = bent(mesh.points);
+  const Points points = points_of_box(20, -0.4 * size_mm);
+  double nearest_share = 0;
+  for (int c = 0; c < mesh.cells.rows(); ++c)
+    for (Eigen::Index p = 0; p < points.rows(); ++p) {
+      const CurvedCell cell(mesh.points, mesh.cells, c);
+      const Eigen::Vector3d point = points.row(p).transpose();
+      const double least = cell.least_distance_mm(point);
+      const double found = cell.find(point, Eigen::Vector4d::Constant(0.25)).outside_mm;
+      EXPECT_LE(least, found + 1e-9) << "cell " << c << ", point " << p;
+      if (found > 5) nearest_share = std::max(nearest_share, least / found);
+    }
+  EXPECT_GT(nearest_share, 0.95) << "as far as the box where that is the cell's own side";
 }
 
 INSTANTIATE_TEST_SUITE_P(Orders, EmbeddingTest, ::testing::Values(1, 2));

@@ -34,10 +34,20 @@ TEST(MeshDoubt, NeverSaysLessThanWasBelieved) {
   EXPECT_LT(with_doubt({0.2, 0.1}, believed, 0.6).sd, believed.sd);
 }
 
+TEST(Mixed, IsAsWideAsWhatIsMixedAndWhatLiesBetween) {
+  const Known one = mixed({{0.3, {2, 0.5}}});
+  EXPECT_DOUBLE_EQ(one.mean, 2);
+  EXPECT_NEAR(one.sd, 0.5, 1e-12);
+  const Known two = mixed({{0.6, {1, 0.5}}, {0.2, {5, 1}}});  // 3 to 1
+  EXPECT_NEAR(two.mean, 2, 1e-12);
+  EXPECT_NEAR(two.sd, std::sqrt(0.75 * 0.25 + 0.25 * 1 + 0.75 * 1 + 0.25 * 9), 1e-12);
+}
+
 TEST(MeshDoubt, IsOfModuliAndPlacesAlone) {
-  EXPECT_DOUBLE_EQ(mesh_doubt("breast.young_modulus_kpa"), mesh_doubt("skin.young_modulus_kpa"));
-  EXPECT_GT(mesh_doubt("misregistration.shift_y_mm"), 0.1);
-  EXPECT_NEAR(mesh_doubt("misregistration.turn_z_rad"), 0.006, 0.001);
+  for (const char* modulus : {"breast.young_modulus_kpa", "skin.young_modulus_kpa"})
+    EXPECT_DOUBLE_EQ(mesh_doubt(modulus), 0.15);
+  EXPECT_DOUBLE_EQ(mesh_doubt("misregistration.shift_y_mm"), 0.6);
+  EXPECT_NEAR(mesh_doubt("misregistration.turn_z_rad"), 0.35 * 3.14159265 / 180, 1e-8);
   for (const char* other : {"breast.poisson_ratio", "ligament.stiffness_kpa_per_mm", "gravity_tilt.roll_rad", ""})
     EXPECT_EQ(mesh_doubt(other), 0) << other;
 }

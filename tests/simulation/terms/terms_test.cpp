@@ -28,19 +28,22 @@ struct Case {
   double fade_mm = 0;
 };
 
+testing::TestScene small_box(int order) {
+  testing::TestScene scene = testing::box_scene(2, {60, 50, 40});
+  if (order == 1) return scene;
+  scene.mesh = testing::quadratic(scene.mesh);
+  auto& a = scene.anatomy;
+  a.q.resize(scene.mesh.points.rows(), 2);
+  for (Eigen::Index p = 0; p < a.q.rows(); ++p)
+    a.q.row(p) = (scene.mesh.points.row(p).transpose() - a.foot_centre_mm).head<2>().transpose() / a.foot_radius_mm;
+  return scene;
+}
+
 // All terms at once on a small box, away from equilibrium, with x and X both moved from the imaged shape.
 class TermsTest : public ::testing::TestWithParam<Case> {
  protected:
   TermsTest() {
-    scene = testing::box_scene(2, {60, 50, 40});
-    if (GetParam().order == 2) scene.mesh = testing::quadratic(scene.mesh);
-    if (GetParam().order == 2) {
-      auto& a = scene.anatomy;
-      const auto n = scene.mesh.points.rows();
-      a.q.resize(n, 2);
-      for (Eigen::Index p = 0; p < n; ++p)
-        a.q.row(p) = (scene.mesh.points.row(p).transpose() - a.foot_centre_mm).head<2>().transpose() / a.foot_radius_mm;
-    }
+    scene = small_box(GetParam().order);
     model = testing::soft_model(GetParam().law, GetParam().skin);
     model.skin.compression = GetParam().compression;
     model.skin.fade_mm = GetParam().fade_mm;
@@ -201,6 +204,32 @@ TEST_P(TermsTest, InvertedElementsAreReported) {
   EXPECT_FALSE(sums->valid);
   EXPECT_LT(sums->min_det_f, 0);
   EXPECT_GE(sums->min_cell, 0);
+}
+
+// Mass is density × imaged volume, or × undeformed volume; both elements, all of it.
+TEST(Weight, IsDensityTimesGravityTimesVolume) {
+  for (const int order : {1, 2})
+    for (const DensityReference reference : {DensityReference::imaged, DensityReference::undeformed}) {
+      const testing::TestScene scene = small_box(order);
+      Model model = testing::soft_model();
+      model.breast.density_kg_m3.value = 950;
+      model.breast.density_refers_to = reference;
+      Mechanics mechanics(scene.mesh, scene.anatomy, model);
+      const Points X = 1.1 * scene.mesh.points;
+      const auto force_mn = [&](const Eigen::Vector3d& down) {
+        mechanics.set_fields(
+            values_of(make_fields(model, Scene{scene.mesh, scene.anatomy, mechanics.layout(), "prone"}, down)));
+        Sums sums(mechanics.pattern());
+        mechanics.evaluate({X, X}, Demand{.residual = true}, sums);
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        for (Eigen::Index n = 0; n < X.rows(); ++n) sum += sums.residual.segment<3>(3 * n);
+        return sum;
+      };
+      const double volume_mm3 = 60.0 * 50 * 40 * (reference == DensityReference::imaged ? 1 : 1.331);
+      const double weight_mn = 950e-9 * 9810 * volume_mm3;  // kg/mm³ × mm/s²
+      const Eigen::Vector3d weight = force_mn({0, -0.6, 0.8}) - force_mn(Eigen::Vector3d::Zero());
+      EXPECT_LT((weight - weight_mn * Eigen::Vector3d(0, 0.6, -0.8)).norm(), 1e-6 * weight_mn) << "order " << order;
+    }
 }
 
 /// Energy, and the sum of the forces on the nodes, of a body without weight that was moved from the imaged shape.
