@@ -19,8 +19,10 @@ using segmentation::Mask;
 using segmentation::meshed_mask;
 using segmentation::Tissue;
 
-// Balls of the 6, 18 and 26 neighbours of a voxel, and of two voxels.
+// Balls of the 6, 18 and 26 neighbours of a voxel, and of two voxels; then in mm, so that finer voxels of the same body
+// say the same.
 constexpr double radii_voxels[] = {1.0, 1.5, 1.8, 2.3};
+constexpr double growth = 1.4;
 
 enum class Change { fill, remove };
 
@@ -36,14 +38,30 @@ struct Piece {
   std::vector<Eigen::Vector3i> voxels;
 };
 
-std::vector<Piece> changed_pieces(const LabelImage& image, Change change, double radius_voxels) {
-  Grid voxels = image.grid;
+// A ball in the unit of a grid.
+struct Ball {
+  Grid grid;
+  double radius;
+};
+
+/// The balls that are tried, smallest first.
+std::vector<Ball> balls_for(const Grid& grid) {
+  std::vector<Ball> balls;
+  Grid voxels = grid;
   voxels.spacing_mm.setOnes();
+  for (const double radius : radii_voxels) balls.push_back({voxels, radius});
+  const double tried_mm = balls.back().radius * grid.spacing_mm.minCoeff();
+  for (double radius = growth * tried_mm; radius < growth * largest_ball_mm; radius *= growth)
+    if (tried_mm < largest_ball_mm) balls.push_back({grid, std::min(radius, largest_ball_mm)});
+  return balls;
+}
+
+std::vector<Piece> changed_pieces(const LabelImage& image, Change change, const Ball& ball) {
+  const auto& [voxels, radius] = ball;
   const Mask before = meshed_mask(image);
   const bool fill = change == Change::fill;
-  const Mask after =
-      fill ? segmentation::erode(segmentation::dilate(before, voxels, radius_voxels), voxels, radius_voxels)
-           : segmentation::dilate(segmentation::erode(before, voxels, radius_voxels), voxels, radius_voxels);
+  const Mask after = fill ? segmentation::erode(segmentation::dilate(before, voxels, radius), voxels, radius)
+                          : segmentation::dilate(segmentation::erode(before, voxels, radius), voxels, radius);
   Mask changed(before.size());
   for (std::size_t v = 0; v < changed.size(); ++v) changed[v] = fill ? after[v] && !before[v] : before[v] && !after[v];
   const segmentation::Components components = segmentation::connected_components(changed, voxels);
@@ -140,8 +158,8 @@ bool closes_handle(LabelImage& image, const Piece& piece, Change change) {
   return closed;
 }
 
-void try_changes(LabelImage& image, Change change, double radius_voxels, HandleRepair& repair) {
-  for (const Piece& piece : changed_pieces(image, change, radius_voxels)) {
+void try_changes(LabelImage& image, Change change, const Ball& ball, HandleRepair& repair) {
+  for (const Piece& piece : changed_pieces(image, change, ball)) {
     if (!closes_handle(image, piece, change)) continue;
     const double volume_mm3 = static_cast<double>(piece.voxels.size()) * image.grid.voxel_volume_mm3();
     (change == Change::fill ? repair.filled_mm3 : repair.removed_mm3) += volume_mm3;
@@ -154,10 +172,11 @@ void try_changes(LabelImage& image, Change change, double radius_voxels, HandleR
 HandleRepair close_handles(LabelImage& image) {
   HandleRepair repair;
   repair.genus = repair.genus_before = report_of(image).genus();
-  for (const double radius : radii_voxels)
+  if (repair.genus == 0) return repair;
+  for (const Ball& ball : balls_for(image.grid))
     for (const Change change : {Change::fill, Change::remove}) {
       if (repair.genus == 0) return repair;
-      try_changes(image, change, radius, repair);
+      try_changes(image, change, ball, repair);
       repair.genus = report_of(image).genus();
     }
   return repair;

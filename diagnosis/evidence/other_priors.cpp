@@ -2,6 +2,7 @@
 #include "diagnosis/evidence/other_priors.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "simulation/catalogue.h"
@@ -46,6 +47,27 @@ std::vector<Hypothesis> weighed_again(std::vector<Hypothesis> hypotheses, double
   return hypotheses;
 }
 
+/// What a local cause adds to a hypothesis, of each kind the square root of what it gains.
+void halve_unlisted(double prior, Hypothesis& h) {
+  if (!(prior > 0)) return;
+  const double each = prior / static_cast<double>(local_kinds), before = std::exp(h.ln_unlisted);
+  double sum = 1 - prior;
+  for (double& share : h.with_unlisted) sum += share = std::sqrt(share * before * each);
+  h.ln_unlisted = std::log(sum);
+  for (double& share : h.with_unlisted) share /= sum;
+}
+
+/// The hypotheses with half of the logarithm of what the scans say of each.
+std::vector<Hypothesis> half_believed(std::vector<Hypothesis> hypotheses, const Priors& priors) {
+  for (Hypothesis& h : hypotheses) {
+    const double of_errors = h.ground != nullptr ? h.ground->ln_weight : 0;  // which stays in the weight of h
+    h.ln_evidence = (h.ln_evidence + of_errors) / 2 - of_errors;
+    halve_unlisted(priors.unlisted, h);
+  }
+  normalise(hypotheses);
+  return hypotheses;
+}
+
 /// With what was left out, and ends of ranges, as they were asked for before.
 std::vector<Inclusion> included_in(const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& effects,
                                    const std::vector<Inclusion>& before, const Priors& priors) {
@@ -65,15 +87,17 @@ std::vector<OtherPrior> under_other_priors(const std::vector<Hypothesis>& hypoth
                                            const std::vector<Inclusion>& included, const Unexplained& unexplained,
                                            const Priors& priors, const std::vector<std::string>& unseen) {
   std::vector<OtherPrior> list;
-  const auto add = [&](const std::string& what, double factor, double scale_factor) {
-    const std::vector<Hypothesis> again = weighed_again(hypotheses, factor, scale_factor);
-    list.push_back(
-        {what, decide(again, effects, included_in(again, effects, included, priors), unexplained, priors, unseen)});
+  const auto add = [&](const std::string& what, const std::vector<Hypothesis>& again) {
+    std::vector<Inclusion> then = included_in(again, effects, included, priors);
+    Diagnosis diagnosis = decide(again, effects, then, unexplained, priors, unseen);
+    list.push_back({what, std::move(diagnosis), std::move(then)});
   };
-  add("strengths half as wide", 0.5, 1);
-  add("strengths twice as wide", 2, 1);
-  add("the unexplained half as large", 1, 0.5);
-  add("the unexplained twice as large", 1, 2);
+  add("strengths half as wide", weighed_again(hypotheses, 0.5, 1));
+  add("strengths twice as wide", weighed_again(hypotheses, 2, 1));
+  add("the unexplained half as large", weighed_again(hypotheses, 1, 0.5));
+  add("the unexplained twice as large", weighed_again(hypotheses, 1, 2));
+  add("the scans counting for half", half_believed(hypotheses, priors));
+  list.back().of_prior = false;
   return list;
 }
 

@@ -130,9 +130,10 @@ DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
   }
   if (result.surface.triangles.rows() == 0) result = decimate_to_triangles(measure, options);
   if (result.surface.triangles.rows() == 0)
-    result = unchanged(measure, false,
-                       "no coarser surface stays within the bound without crossing itself (" + result.reason +
-                           "); the input is returned");
+    result = unchanged(
+        measure, false,
+        "no coarser surface stays within the bound without crossing itself (" + result.reason +
+            "); the input is returned: allow a larger distance, or smooth it more (supine-reconstruct --smooth-mm)");
   else if (!result.reached_target)
     result.reason = too_many(result, options);
   result.fallback = fallback;

@@ -55,7 +55,7 @@ class ReconstructTool : public Tool {
                    "loose bits of tissue below this volume are left out, mm3, >= 0");
     app.add_option("--thinnest-mm", options_.thinnest_mm,
                    "perforators (strands of tissue inside the muscle) thinner than this are counted as muscle, mm, >= "
-                   "0; 0 also leaves handles as thin as voxels");
+                   "0; 0 also leaves thin handles");
   }
 
   Outcome run(Run& run) override {
@@ -210,17 +210,17 @@ class ReconstructTool : public Tool {
     if (!handles.places_mm.empty()) {
       const Eigen::Vector3d& at = handles.places_mm.front();
       run.warn(
-          fmt::format("{} handle(s) as thin as voxels were closed, {:.2f} ml filled and {:.2f} ml taken away, the "
+          fmt::format("{} thin handle(s) were closed, {:.2f} ml filled and {:.2f} ml taken away, the "
                       "first at ({:.0f}, "
                       "{:.0f}, {:.0f}) mm; the labels stay as they are",
                       handles.genus_before - handles.genus, handles.filled_mm3 / 1000, handles.removed_mm3 / 1000,
                       at.x(), at.y(), at.z()));
     }
     if (handles.genus > 0)
-      run.warn(
-          fmt::format("the {} has {} handle(s), tunnels or rings thicker than 4 voxels; if it should have none, "
-                      "look for them in the labels",
-                      body_word(), handles.genus));
+      run.warn(fmt::format(
+          "the {} has {} handle(s), tunnels or rings thicker than 4 voxels and 8 mm; if it should have none, "
+          "look for them in the labels",
+          body_word(), handles.genus));
   }
 
   Outcome judge(Run& run, const Reconstruction& made) const {

@@ -311,10 +311,14 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["why"] = found.diagnosis.why;
   f["ambiguous_rest"] = found.diagnosis.ambiguous_rest;
   f["under_other_priors"] = Json::array();
-  for (const diagnosis::OtherPrior& other : found.under_other_priors)
-    f["under_other_priors"].push_back({{"what", other.what},
-                                       {"verdict", diagnosis::verdict_name(other.diagnosis.verdict)},
-                                       {"missing", other.diagnosis.missing}});
+  for (const diagnosis::OtherPrior& other : found.under_other_priors) {
+    Json one = {{"what", other.what},
+                {"verdict", diagnosis::verdict_name(other.diagnosis.verdict)},
+                {"missing", other.diagnosis.missing},
+                {"included", Json::object()}};
+    for (const diagnosis::Inclusion& i : other.included) one["included"][i.effect] = i.probability;
+    f["under_other_priors"].push_back(std::move(one));
+  }
   f["hypotheses"] = hypotheses_json(found);
   f["included"] = included_json(found);
   f["singles"] = singles_json(found);

@@ -166,14 +166,24 @@ void say_numbers(const Run& run, const Findings& found) {
       run.say(fmt::format("  {}, whichever set holds it: {}", name, values_of(numbers)));
 }
 
-/// What the verdict would be where another prior changes it.
+/// Names with their probabilities: "ligament 0.82 or adhesion 0.31".
+std::string with_probabilities(const diagnosis::OtherPrior& other) {
+  std::vector<std::string> words;
+  for (const std::string& name : other.diagnosis.missing) {
+    const auto one = std::find_if(other.included.begin(), other.included.end(),
+                                  [&name](const diagnosis::Inclusion& i) { return i.effect == name; });
+    words.push_back(one == other.included.end() ? name : fmt::format("{} {:.2f}", name, one->probability));
+  }
+  return joined(words, other.diagnosis.verdict == Verdict::missing ? " and " : " or ");
+}
+
+/// What the verdict would be where another prior, or less trust in the scans, changes it.
 void say_other_priors(const Run& run, const Findings& found) {
   for (const diagnosis::OtherPrior& other : found.under_other_priors) {
     const diagnosis::Diagnosis& d = other.diagnosis;
     if (d.verdict == found.diagnosis.verdict && d.missing == found.diagnosis.missing) continue;
-    run.say(fmt::format(
-        "  with {} in the prior: {}{}", other.what, diagnosis::verdict_name(d.verdict),
-        d.missing.empty() ? "" : " " + joined(d.missing, d.verdict == Verdict::missing ? " and " : " or ")));
+    run.say(fmt::format("  with {}{}: {}{}", other.what, other.of_prior ? " in the prior" : "",
+                        diagnosis::verdict_name(d.verdict), d.missing.empty() ? "" : " " + with_probabilities(other)));
   }
 }
 

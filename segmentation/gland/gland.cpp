@@ -66,12 +66,12 @@ std::vector<float> share_of(const SeriesContrast& series) {
 /// The share that both series say, where the gland itself lies: in a series without fat suppression its edges are those
 /// of the fat, which the scanner moved.
 SeriesContrast take_together(const GreyImage& image, const SeriesContrast& first, const SeriesContrast& second,
-                             GlandOptions::Contrast contrast, GlandResult::Second& said) {
+                             const GlandOptions& options, GlandResult::Second& said) {
   check_contrast(first, second);
   said.fat_sd = second.fat.sd, said.pure = second.pure;
   SeriesContrast both{share_by_both(first, second), 1, first.usable};
   for (std::size_t n = 0; n < both.usable.size(); ++n) both.usable[n] = both.usable[n] || second.usable[n];
-  if (contrast == GlandOptions::Contrast::bright) return both;
+  if (options.contrast == GlandOptions::Contrast::bright || !options.find_fat_shift) return both;
   const FatShift shift = find_fat_shift(image, share_of(second), second.usable);
   said.fat_shift_mm = shift.fat_mm;
   said.shift_mm += shift.laid_mm + shift.fat_mm;
@@ -113,10 +113,10 @@ GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const Gl
   if (second != nullptr && options.second) {
     const SecondSeries laid = lay_over(*second, image, place.breast, under_skin);
     result.second = {laid.shift_mm, Eigen::Vector3d::Zero(), 0, 0};
-    series = take_together(image, series, contrast_in(laid.image, inner, under_skin, *options.second, options),
-                           options.contrast, *result.second);
+    series = take_together(image, series, contrast_in(laid.image, inner, under_skin, *options.second, options), options,
+                           *result.second);
     for (std::size_t n = 0; n < inner.size(); ++n) series.usable[n] = series.usable[n] && inner[n];
-  } else if (options.contrast == GlandOptions::Contrast::dark)
+  } else if (options.contrast == GlandOptions::Contrast::dark && options.find_fat_shift)
     result.fat_shift_mm = put_back(grid, series);
   result.failed_ml = volume_ml(inner, grid) - volume_ml(series.usable, grid);
   inner = std::move(series.usable);

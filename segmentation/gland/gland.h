@@ -27,6 +27,8 @@ struct GlandOptions {
   double least_deviations = 2;     ///< of the fat's scatter, that a labelled voxel differs at least; >= 0
   double gap_mm = 2.5;             ///< gaps narrower than twice this are gland too, as a reader outlines it; >= 0
   double failed_share = 1.6;       ///< bright: where fat is brighter than so many times its median, suppression failed
+  /// Dark: whether the scanner's shift of fat is looked for and gland put back; without, it lies where the grey does.
+  bool find_fat_shift = true;
 };
 
 /// What find_gland was given besides the greys; masks of the image's grid.

@@ -94,6 +94,7 @@ Step read_gland(const StepTable& table) {
   o.least_deviations = table.number("least_deviations", not_negative).value_or(o.least_deviations);
   o.gap_mm = table.number("gap_mm", not_negative).value_or(o.gap_mm);
   o.failed_share = table.number("failed_share", {.lower = 1.1}).value_or(o.failed_share);
+  o.find_fat_shift = table.choice<bool>("fat_shift", {{"find", true}, {"none", false}}).value_or(o.find_fat_shift);
   return step;
 }
 

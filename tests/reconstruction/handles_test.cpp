@@ -17,18 +17,19 @@ using segmentation::Tissue;
 constexpr double voxel_mm = 1.5;
 
 // The dome on its slab with a tunnel of air through it along z and a ring of skin that stands off it along x.
-LabelImage dome_with(double tunnel_mm, double strand_mm) {
+LabelImage dome_with(double tunnel_mm, double strand_mm, double spacing_mm = voxel_mm) {
   const auto box = [](const Eigen::Vector3d& at, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
     return ((at - low).array() > 0).all() && ((high - at).array() > 0).all();
   };
-  return testing::voxelise(testing::cubic_grid(Eigen::Vector3d(45, 45, 45), voxel_mm), [=](const Eigen::Vector3d& at) {
-    const double t = tunnel_mm / 2, s = strand_mm / 2;
-    if (t > 0 && std::abs(at.x()) < t && std::abs(at.y() + 15) < t) return Tissue::air;
-    if (s > 0 && (box(at, {-s, -40, 10 - s}, {s, -40 + 2 * s, 18 + s}) ||
-                  box(at, {-s, -40, 10 - s}, {s, -20, 10 + s}) || box(at, {-s, -40, 18 - s}, {s, -15, 18 + s})))
-      return Tissue::skin;
-    return testing::dome_on_slab(at);
-  });
+  return testing::voxelise(
+      testing::cubic_grid(Eigen::Vector3d(45, 45, 45), spacing_mm), [=](const Eigen::Vector3d& at) {
+        const double t = tunnel_mm / 2, s = strand_mm / 2;
+        if (t > 0 && std::abs(at.x()) < t && std::abs(at.y() + 15) < t) return Tissue::air;
+        if (s > 0 && (box(at, {-s, -40, 10 - s}, {s, -40 + 2 * s, 18 + s}) ||
+                      box(at, {-s, -40, 10 - s}, {s, -20, 10 + s}) || box(at, {-s, -40, 18 - s}, {s, -15, 18 + s})))
+          return Tissue::skin;
+        return testing::dome_on_slab(at);
+      });
 }
 
 TEST(Handles, SoundDomeStaysAsItIs) {
@@ -65,6 +66,17 @@ TEST(Handles, StrandThatHoldsOnAtBothEndsIsTakenAway) {
   EXPECT_EQ(repair.genus_before, 1);
   EXPECT_EQ(repair.genus, 0);
   EXPECT_GT(repair.removed_mm3 + repair.filled_mm3, 0);
+}
+
+TEST(Handles, SameTunnelIsFilledWhereVoxelsAreFiner) {
+  constexpr double tunnel_mm = 4;
+  for (const double spacing_mm : {voxel_mm, 0.75}) {
+    LabelImage image = dome_with(tunnel_mm, 0, spacing_mm);
+    const HandleRepair repair = close_handles(image);
+    EXPECT_EQ(repair.genus_before, 1) << spacing_mm;
+    EXPECT_EQ(repair.genus, 0) << spacing_mm;
+    EXPECT_GT(repair.filled_mm3, 0) << spacing_mm;
+  }
 }
 
 TEST(Handles, ThickTunnelIsLeftAndCounted) {

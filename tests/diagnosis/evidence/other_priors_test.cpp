@@ -51,11 +51,39 @@ Sheet just_named() {
 TEST(OtherPriors, AWiderPriorChargesAnEffectForWhatItCouldHaveBeen) {
   const Sheet sheet = just_named();
   const auto others = sheet.others();
-  ASSERT_EQ(others.size(), 4u);
+  ASSERT_EQ(others.size(), 5u);
   EXPECT_EQ(others[0].what, "strengths half as wide");
   EXPECT_EQ(others[0].diagnosis.verdict, Verdict::missing);
   EXPECT_EQ(others[1].what, "strengths twice as wide");
   EXPECT_EQ(others[1].diagnosis.verdict, Verdict::ambiguous) << "half the odds are under the level";
+}
+
+TEST(OtherPriors, ScansThatCountForHalfTakeTheRootOfABayesFactor) {
+  const Sheet sheet = just_named();
+  const OtherPrior half = sheet.others().back();
+  EXPECT_EQ(half.what, "the scans counting for half");
+  const double stated = sheet.included.front().probability, then = half.included.front().probability;
+  EXPECT_NEAR(then / (1 - then), std::sqrt(stated / (1 - stated)), 1e-9) << "the prior's odds are one to one";
+  EXPECT_EQ(half.diagnosis.verdict, Verdict::ambiguous);
+}
+
+TEST(OtherPriors, ScansThatCountForHalfSayHalfOfWhatIsNotListed) {
+  Sheet sheet(0);
+  // A bump of the skin makes nothing e⁴ likelier; without any it would be 0.9 of what it was.
+  const double each = sheet.priors.unlisted / local_kinds, rest = 1 - sheet.priors.unlisted;
+  const auto with_gain = [&](double gain) { return each * (std::exp(gain) + 2); };
+  for (Hypothesis& h : sheet.hypotheses) {
+    const double gain = h.effects.empty() ? 4 : 0, sum = rest + with_gain(gain);
+    h.ln_unlisted = std::log(sum);
+    h.with_unlisted = {each / sum, each * std::exp(gain) / sum, each / sum};
+  }
+  normalise(sheet.hypotheses);
+  sheet.included = inclusions(sheet.hypotheses, sheet.effects, sheet.priors);
+  const double plain =
+      std::exp(sheet.hypotheses[0].effects.empty() ? sheet.hypotheses[1].ln_evidence - sheet.hypotheses[0].ln_evidence
+                                                   : sheet.hypotheses[0].ln_evidence - sheet.hypotheses[1].ln_evidence);
+  const double then = sheet.others().back().included.front().probability;
+  EXPECT_NEAR(then / (1 - then), std::sqrt(plain) / (rest + with_gain(2)), 1e-9);
 }
 
 TEST(OtherPriors, DoNotChangeWhatIsPlain) {

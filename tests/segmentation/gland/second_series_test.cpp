@@ -181,7 +181,9 @@ TEST(GlandByOneSeries, IsPutBackWhereFatLiesAsideAndElseLeft) {
   for (std::size_t n = 0; n < back.fraction.size(); ++n) share += back.fraction[n], truth += b.truth[n];
   EXPECT_NEAR(share / truth, 1, 0.1);
   EXPECT_FALSE(find_gland(series(b.grid, 100, 40, 2, in_place), b.place, {}).fat_shift_mm);
-  GlandOptions bright;
+  GlandOptions left, bright;
+  left.find_fat_shift = false;
+  EXPECT_FALSE(find_gland(series(b.grid, 100, 40, 2, in_place, fat_shift), b.place, left).fat_shift_mm);
   bright.contrast = GlandOptions::Contrast::bright;
   EXPECT_FALSE(find_gland(series(b.grid, 30, 120, 3, in_place, fat_shift), b.place, bright).fat_shift_mm);
 }

@@ -112,6 +112,7 @@ TEST(RecipeToml, ReadsEveryKindOfStep) {
     chest = "c"
     contrast = "bright"
     failed_share = 2
+    fat_shift = "none"
   )");
   ASSERT_EQ(recipe.steps.size(), std::variant_size_v<Step>);
   for (std::size_t s = 0; s < recipe.steps.size(); ++s) EXPECT_EQ(recipe.steps[s].index(), s);
@@ -119,6 +120,7 @@ TEST(RecipeToml, ReadsEveryKindOfStep) {
   EXPECT_EQ(std::get<Bias>(recipe.steps[1]).level, 100);
   EXPECT_EQ(std::get<Gland>(recipe.steps[17]).options.contrast, GlandOptions::Contrast::bright);
   EXPECT_EQ(std::get<Gland>(recipe.steps[17]).options.failed_share, 2);
+  EXPECT_FALSE(std::get<Gland>(recipe.steps[17]).options.find_fat_shift);
   EXPECT_EQ(std::get<Threshold>(recipe.steps[3]).grey.upper, 12.5f);
   const auto& grow = std::get<Grow>(recipe.steps[4]);
   EXPECT_EQ(grow.seeds_mm[1], Eigen::Vector3d(4.5, 5, 6));
