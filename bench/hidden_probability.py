@@ -14,10 +14,10 @@ def statements(cases):
             if effect not in case["neither"]]
 
 
-def reliability(stated):
+def reliability(stated, edges=EDGES):
     """(from, to, number, mean probability stated, share that was there) of each bin that has any."""
     curve = []
-    for low, high in zip(EDGES, EDGES[1:]):
+    for low, high in zip(edges, edges[1:]):
         rows = [row for row in stated if low <= row[1] < high or row[1] == high == 1]
         if rows:
             curve.append((low, high, len(rows), sum(row[1] for row in rows) / len(rows),
