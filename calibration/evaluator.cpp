@@ -97,7 +97,7 @@ Eigen::VectorXd Evaluator::distance_derivative(const simulation::Model& model, c
   Eigen::VectorXd slope(unit.rows());
   for (Eigen::Index i = 0; i < unit.rows(); ++i) {
     Eigen::RowVector3d moved = scan.row(i);
-    for (int k = 0; k < 3; ++k) moved -= closest.weight(i, k) * skin.row(closest.node(i, k));
+    for (Eigen::Index k = 0; k < closest.node.cols(); ++k) moved -= closest.weight(i, k) * skin.row(closest.node(i, k));
     slope[i] = moved.dot(unit.row(i));
   }
   return slope;

@@ -47,12 +47,30 @@ const Points& checked(const meshing::TetMesh& mesh, const Points& positions) {
 }  // namespace
 
 ModelSkin::ModelSkin(const meshing::TetMesh& mesh, const Points& positions)
-    : ModelSkin(checked(mesh, positions), skin_triangles(mesh)) {}
+    : ModelSkin(checked(mesh, positions), skin_triangles(mesh)) {
+  if (mesh.faces.cols() == 3) return;
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f)
+    if (is_skin(mesh, f)) rows.push_back(f);
+  curved_.emplace(mesh.faces(rows, Eigen::all));
+  of_curved_.emplace(curved_->corners(positions), curved_->triangles());
+}
 
 ModelSkin::ModelSkin(const Points& points, const Triangles& triangles) : distance_(points, triangles) {
   nodes_.assign(triangles.data(), triangles.data() + triangles.size());
   std::sort(nodes_.begin(), nodes_.end());
   nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
+}
+
+void ModelSkin::move(const Points& positions) {
+  distance_.move(positions);
+  if (curved_) of_curved_->move(curved_->corners(positions));
+}
+
+void ModelSkin::closest(const Points& queries, ClosestPoints& result) const {
+  if (!curved_) return distance_.closest(queries, result);
+  of_curved_->closest(queries, result);
+  curved_->by_faces(result);
 }
 
 Points ModelSkin::node_points() const { return distance_.points()(nodes_, Eigen::all); }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "calibration/curved_faces.h"
 #include "calibration/surface_distance.h"
 #include "meshing/anatomy.h"
 #include "meshing/tet_mesh.h"
@@ -18,8 +20,8 @@ struct SkinAreas {
 
 /// The skin of the model in one pose: the part of its boundary that a scanner sees.
 ///
-/// Quadratic faces are split into four flat triangles over their six nodes, so every weight belongs to a mesh node
-/// and the distance of a curved face is off by at most its deviation from the four facets.
+/// Distances are those to the curved faces of quadratic cells (CurvedFaces). Areas, pictures and normals of nodes take
+/// such a face as four flat triangles over its six nodes.
 class ModelSkin {
  public:
   /// @param positions  #N by 3, places of the mesh points in the pose, mm
@@ -31,9 +33,13 @@ class ModelSkin {
   ModelSkin(const Points& points, const Triangles& triangles);
 
   /// Another pose or another parameter: new places of the same mesh points.
-  void move(const Points& positions) { distance_.move(positions); }
+  void move(const Points& positions);
 
-  /// Rows are those of the mesh's points.
+  /// Closest points of @p queries (#Q by 3, mm) on the skin. node and weight hold the nodes of the face, three or six
+  /// to a row, of six some with negative weights; triangle is a row of triangles().
+  void closest(const Points& queries, ClosestPoints& result) const;
+
+  /// The flat triangles; rows are those of the mesh's points.
   const SurfaceDistance& distance() const { return distance_; }
   const Triangles& triangles() const { return distance_.triangles(); }
   /// Mesh points of the skin, ascending.
@@ -44,6 +50,8 @@ class ModelSkin {
 
  private:
   SurfaceDistance distance_;
+  std::optional<CurvedFaces> curved_;         // of quadratic cells, and
+  std::optional<SurfaceDistance> of_curved_;  // their index
   std::vector<int> nodes_;
 };
 

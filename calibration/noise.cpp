@@ -49,10 +49,9 @@ double standardised_deviation(const NeighbourSearch& search, const Eigen::Vector
   Eigen::Matrix<double, neighbours, 3> design;  // 1, and the two directions of the surface
   design.col(0).setOnes();
   design.rightCols<2>() = arm * svd.matrixV().leftCols<2>();
-  const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, neighbours, 3>> qr(design);
-  const double predicted = qr.solve(d)[0];
-  const Eigen::Matrix3d inverse = (design.transpose() * design).ldlt().solve(Eigen::Matrix3d::Identity());
-  return (distance_mm[query] - predicted) / std::sqrt(1 + inverse(0, 0));
+  // Neighbours may all lie on one line, as places on a ridge of the skin do.
+  const Eigen::Matrix<double, 1, neighbours> share = design.completeOrthogonalDecomposition().pseudoInverse().row(0);
+  return (distance_mm[query] - share.dot(d)) / std::sqrt(1 + share.squaredNorm());
 }
 
 }  // namespace

@@ -16,7 +16,9 @@ inline constexpr double least_noise_mm = 0.25;
 /// to 3000 points against the plane through the distances of its 16 neighbours, median absolute deviation. What
 /// varies over more than a few points (the model's error) cancels; so does noise that neighbouring points share,
 /// which makes this a lower bound for scanners that smooth.
-/// @param place        #R by 3, mm
+/// @param place        #R by 3, mm. Best the closest points on the model (Residuals::on_skin): by the places of the
+///   scan's points themselves the nearest are those that err alike, and noise comes out low, by 4 % at 0.7 mm where
+///   points lie 2.4 mm apart
 /// @param distance_mm  #R, signed
 /// @throws InputError  fewer than 40 points
 double estimate_noise_mm(const Points& place, const Eigen::VectorXd& distance_mm);

@@ -80,7 +80,7 @@ Residuals residuals_of(const MeasuredScene& scene, const Prediction& prediction,
       residuals.place.row(row) = prediction.poses[m].scan_points.row(i);
       residuals.on_skin.row(row) = distances.closest.point.row(i);
       residuals.q.row(row).setZero();
-      for (int k = 0; k < 3; ++k)
+      for (Eigen::Index k = 0; k < distances.closest.node.cols(); ++k)
         residuals.q.row(row) +=
             distances.closest.weight(i, k) * scene.anatomy->chart(distances.closest.node(i, k)).transpose();
       residuals.pose[row] = static_cast<int>(m);
@@ -128,7 +128,7 @@ Eigen::VectorXd distance_change(const Prediction& prediction, const Residuals& r
       change[r] = -landmarks[m](i / 3, i % 3);
       continue;
     }
-    for (int k = 0; k < 3; ++k)
+    for (Eigen::Index k = 0; k < closest.node.cols(); ++k)
       change[r] -= closest.weight(i, k) * moves[m].row(closest.node(i, k)).dot(unit[m].row(i));
   }
   return change;

@@ -83,7 +83,7 @@ void turn_outward(const std::vector<int>& piece, const Points& points, const Mod
     normals.row(t) = (b - a).cross(c - a);
   }
   ClosestPoints closest;
-  model.distance().closest(centres, closest);
+  model.closest(centres, closest);
   std::vector<double> vote(*std::max_element(piece.begin(), piece.end()) + 1, 0.0);
   for (Eigen::Index t = 0; t < triangles.rows(); ++t) vote[piece[t]] += normals.row(t).dot(closest.normal.row(t));
   for (Eigen::Index t = 0; t < triangles.rows(); ++t) {
@@ -110,7 +110,7 @@ Points flipped(const Points& points) { return points * Eigen::Vector3d(-1, -1, 1
 // second leaves the distance as it is, because diag(−1, −1, 1) is its own inverse.
 double median_distance_mm(const Scan& scan, const ModelSkin& model, bool flip) {
   ClosestPoints closest;
-  model.distance().closest(flip ? flipped(scan.points()) : scan.points(), closest);
+  model.closest(flip ? flipped(scan.points()) : scan.points(), closest);
   const double to_skin = median(closest.distance_mm);
   scan.distance().closest(flip ? flipped(model.node_points()) : model.node_points(), closest);
   return std::min(to_skin, median(closest.distance_mm));

@@ -37,7 +37,7 @@ double cosine(const Scan& scan, const ClosestPoints& closest, Eigen::Index i, co
 }  // namespace
 
 void scan_to_model(const ModelSkin& model, const Points& scan_points, SignedDistances& result) {
-  model.distance().closest(scan_points, result.closest);
+  model.closest(scan_points, result.closest);
   const ClosestPoints& closest = result.closest;
   result.distance_mm.resize(scan_points.rows());
   for (Eigen::Index i = 0; i < scan_points.rows(); ++i) {

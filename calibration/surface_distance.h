@@ -12,8 +12,8 @@ struct ClosestPoints {
   Points point;                 ///< #Q by 3, mm
   Eigen::VectorXd distance_mm;  ///< #Q, >= 0
   Eigen::VectorXi triangle;     ///< #Q; -1 on a bare point cloud
-  Triangles node;               ///< #Q by 3; points of the triangle; of a cloud: the nearest point, thrice
-  Points weight;                ///< #Q by 3; barycentric, point = Σ weight · node; of a cloud (1, 0, 0)
+  Indices node;                 ///< #Q by 3; points of the triangle; of a cloud: the nearest point, thrice
+  Table weight;                 ///< #Q by 3; barycentric, point = Σ weight · node; of a cloud (1, 0, 0)
   Points normal;                ///< #Q by 3; unit pseudo-normal; of a cloud: of the local fit, its sense open
   Eigen::Array<bool, Eigen::Dynamic, 1> on_border;  ///< #Q; on an open edge; of a cloud: beyond its last points
 

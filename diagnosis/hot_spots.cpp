@@ -81,8 +81,8 @@ SkinError skin_error(const calibration::ModelSkin& skin, const calibration::Resi
   for (Eigen::Index r = 0; r < residuals.skin_rows(); ++r) {
     if (residuals.pose[r] != static_cast<int>(pose)) continue;
     const int point = residuals.point[r];
-    for (int k = 0; k < 3; ++k) {
-      const double w = closest.weight(point, k);
+    for (Eigen::Index k = 0; k < closest.node.cols(); ++k) {
+      const double w = std::max(0.0, closest.weight(point, k));  // a mean is meant: no point counts against it
       const int node = closest.node(point, k);
       sums.weight[node] += w;
       sums.value[node] += w * residuals.distance_mm[r];

@@ -13,6 +13,7 @@
 #include "diagnosis/creases.h"
 #include "diagnosis/evidence/discrepancy.h"
 #include "diagnosis/evidence/field_modes.h"
+#include "diagnosis/evidence/mean_kernel.h"
 #include "diagnosis/evidence/mesh_doubt.h"
 #include "diagnosis/weighted_fit.h"
 #include "simulation/parameters.h"
@@ -55,7 +56,8 @@ ScanNoise noise_of(const Residuals& residuals, const VectorXd& shared_mm,
       continue;
     }
     if (rows.size() < fewest) continue;
-    const double seen = calibration::estimate_noise_mm(residuals.place(rows, Eigen::all), residuals.distance_mm(rows));
+    const double seen =
+        calibration::estimate_noise_mm(residuals.on_skin(rows, Eigen::all), residuals.distance_mm(rows));
     for (const int r : rows) {
       const double given = residuals.sigma_mm[r];
       noise.white_mm[r] = std::max(seen, calibration::least_noise_mm);
@@ -162,6 +164,14 @@ void find_errors(Evaluator& evaluator, JointFitter& fitter, const Priors& priors
   add_up_errors(evaluator, priors, base);
 }
 
+/// Where the discrepancy is of some size, allows for its shapes as the fit leaves them open. @return  whether it did
+bool allow_for_shapes(const calibration::MeasuredScene& scene, BaseFit& base) {
+  if (base.size_mm < least_size_of_mean_kernel_mm) return false;
+  base.kernel = mean_kernel(scene, base);
+  base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);
+  return true;
+}
+
 /// Parameters stay where they were fitted, and go together as they did.
 void allow_for_mesh(const FreeParameters& parameters, const Directions& all, JointPosterior& found) {
   const Index moduli = found.of_parameters.rows();
@@ -266,6 +276,7 @@ BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, con
     fitter.descend(most_steps, [&] { tell("fit with all that is never known"); });
     if ((base.fit.u - measured_at).cwiseAbs().maxCoeff() < far) break;
   }
+  if (allow_for_shapes(evaluator.scene(), base)) fitter.descend(most_steps);
   return base;
 }
 
@@ -285,6 +296,7 @@ std::unique_ptr<BaseFit> ground_beside(const calibration::MeasuredScene& scene, 
   }
   JointFitter fitter(evaluator, *ground, *ground);
   find_errors(evaluator, fitter, priors, base.numerical.has_value(), &meshes, *ground);
+  allow_for_shapes(scene, *ground);
   return ground;
 }
 

@@ -34,13 +34,15 @@ Eigen::MatrixXd gaussian_kernel(const Points& a, const Points& b, double length_
 }
 
 Eigen::MatrixXd field_modes(const Points& points, double length_mm, int most) {
-  constexpr int centres_at_most = 60;
-  constexpr double least_share = 1e-3;  // of the largest variance
+  constexpr int centres_at_most = 300;
+  constexpr double share_held = 0.98;
   const Points centres = points(spread_out(points, centres_at_most), Eigen::all);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gaussian_kernel(centres, centres, length_mm));
   const Eigen::VectorXd& variance = eigen.eigenvalues();  // ascending
   const Eigen::Index count = variance.size();
-  const auto kept = std::min<Eigen::Index>(most, (variance.array() > least_share * variance[count - 1]).count());
+  Eigen::Index kept = 0;
+  for (double held = 0; kept < std::min<Eigen::Index>(most, count) && held < share_held * variance.sum(); ++kept)
+    held += variance[count - 1 - kept];
   const Eigen::MatrixXd along = eigen.eigenvectors().rightCols(kept).rowwise().reverse();
   const Eigen::VectorXd scale = variance.tail(kept).reverse().cwiseSqrt().cwiseInverse();
   return gaussian_kernel(points, centres, length_mm) * along * scale.asDiagonal();

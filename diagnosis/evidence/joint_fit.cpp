@@ -79,7 +79,8 @@ void solve_first(calibration::Evaluator& evaluator, const std::vector<std::strin
   fit = std::move(best);
 }
 
-/// The shapes that a trial is likely to have, to first order.
+}  // namespace
+
 simulation::ChainSolution expected_at(const JointTrial& trial, const calibration::Fit& from,
                                       const std::vector<Nuisance>& nuisances) {
   simulation::ChainSolution near =
@@ -88,8 +89,6 @@ simulation::ChainSolution expected_at(const JointTrial& trial, const calibration
     move_along(nuisances[k], trial.nuisances[k].value - nuisances[k].value, near);
   return near;
 }
-
-}  // namespace
 
 JointFitter::JointFitter(calibration::Evaluator& evaluator, JointFit& fit, const BaseFit& ground)
     : evaluator_(evaluator), fit_(fit), ground_(ground), poses_(poses_of(evaluator.scene())) {}

@@ -38,6 +38,10 @@ struct JointTrial {
   std::vector<Nuisance> nuisances;
 };
 
+/// The shapes that a trial is likely to have, to first order from a fit with these nuisances, slopes and all.
+simulation::ChainSolution expected_at(const JointTrial& trial, const calibration::Fit& from,
+                                      const std::vector<Nuisance>& nuisances);
+
 /// Gauss–Newton in the free parameters and the nuisances of a model, under the errors of a base fit: distances are
 /// exact at every step, the discrepancy is linear.
 class JointFitter {

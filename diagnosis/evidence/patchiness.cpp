@@ -13,19 +13,19 @@ using simulation::Dual;
 using simulation::Fields;
 using simulation::PoseLoad;
 
-constexpr int most_shapes = 40;  // of each field
+constexpr int most_on_surfaces = 40;  // shapes of what varies over skin or muscle alone
 
 Eigen::MatrixXd tissue_fields(const meshing::TetMesh& mesh, const Patchiness& size) {
   Eigen::VectorXd volume(mesh.cells.rows());
   for (Eigen::Index c = 0; c < volume.size(); ++c) volume[c] = meshing::cell_volume_mm3(mesh.points, mesh.cells, c);
   return size.tissue * without(Eigen::VectorXd::Ones(volume.size()), volume,
-                               field_modes(middles(mesh.points, mesh.cells, 4), size.tissue_length_mm, most_shapes));
+                               field_modes(middles(mesh.points, mesh.cells, 4), size.tissue_length_mm));
 }
 
 Eigen::MatrixXd skin_fields(const meshing::TetMesh& mesh, const simulation::Layout& layout, const Patchiness& size) {
   const Indices faces = mesh.faces(layout.skin.faces, Eigen::all);
   return size.skin * without(Eigen::VectorXd::Ones(faces.rows()), layout.skin.area_mm2,
-                             field_modes(middles(mesh.points, faces, 3), size.skin_length_mm, most_shapes));
+                             field_modes(middles(mesh.points, faces, 3), size.skin_length_mm, most_on_surfaces));
 }
 
 /// Over the quadrature points of the interface; places along the muscle are those of anatomy coordinates.
@@ -41,7 +41,7 @@ Eigen::MatrixXd muscle_fields(const meshing::Anatomy& anatomy, const simulation:
     const double rest = std::max(0.0, 1 - group.q.row(p).squaredNorm());
     hill[p] = rest * rest * rest;
   }
-  return size.muscle_mm * without(hill, group.area_mm2, field_modes(places, size.muscle_length_mm, most_shapes));
+  return size.muscle_mm * without(hill, group.area_mm2, field_modes(places, size.muscle_length_mm, most_on_surfaces));
 }
 
 }  // namespace

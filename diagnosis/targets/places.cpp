@@ -40,22 +40,22 @@ Places places_of(const meshing::TetMesh& mesh, const Points& imaged, const Point
   Places places{Points(3 * count, 3), Points(3 * count, 3), {}, {}, {}};
   const Points there = simulation::Embedding(mesh, imaged).at(x);
   calibration::ClosestPoints closest;
-  surface.closest(there, closest);
+  skin.closest(there, closest);
   for (Index p = 0; p < count; ++p) {
-    const auto set = [&](Index row, const auto& nodes, const Vector3d& weight) {
+    const auto set = [&](Index row, const auto& nodes, const auto& weight) {
       places.imaged.row(row).setZero(), places.there.row(row).setZero();
-      for (int a = 0; a < 3; ++a) {
+      for (Index a = 0; a < weight.size(); ++a) {
         places.imaged.row(row) += weight[a] * mesh.points.row(nodes[a]);
         places.there.row(row) += weight[a] * x.row(nodes[a]);
       }
     };
     places.imaged.row(p) = imaged.row(p), places.there.row(p) = there.row(p);
-    set(count + p, closest.node.row(p), closest.weight.row(p).transpose());
+    set(count + p, closest.node.row(p), closest.weight.row(p));
     places.normal.push_back(closest.normal.row(p).transpose());
     const auto over = last_crossing(surface, there.row(p).transpose(), up);
     places.has_straight.push_back(over.has_value());
     if (!over) {
-      set(2 * count + p, closest.node.row(p), closest.weight.row(p).transpose());
+      set(2 * count + p, closest.node.row(p), closest.weight.row(p));
       places.straight_normal.push_back(places.normal.back());
       continue;
     }

@@ -210,7 +210,8 @@ std::vector<double> MeasuredCase::noise_mm(calibration::Evaluator& evaluator) co
     for (std::size_t other = 0; other < mask.size(); ++other)
       if (other != m) mask[other].setConstant(false);
     const auto residuals = calibration::residuals_of(evaluator.scene(), prediction, mask, placeholder);
-    noise.push_back(calibration::estimate_noise_mm(residuals.place, residuals.distance_mm));
+    const Eigen::Index rows = residuals.skin_rows();
+    noise.push_back(calibration::estimate_noise_mm(residuals.on_skin.topRows(rows), residuals.distance_mm.head(rows)));
   }
   return noise;
 }

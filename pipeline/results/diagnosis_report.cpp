@@ -7,204 +7,18 @@
 #include <cmath>
 
 #include "common/rms.h"
-#include "common/statistics.h"
 #include "diagnosis/diagnosis_file.h"
 #include "diagnosis/evidence/nuisance_words.h"
-#include "diagnosis/over_sets.h"
-#include "diagnosis/size_named.h"
-#include "simulation/parameters.h"
+#include "pipeline/results/evidence_json.h"
 
 namespace supine::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
 using diagnosis::Findings;
-using diagnosis::Refit;
 using diagnosis::Score;
 using diagnosis::Verdict;
 using Json = nlohmann::ordered_json;
-
-const diagnosis::Candidate& candidate_of(const Findings& found, const std::string& effect) {
-  return *std::find_if(found.candidates.begin(), found.candidates.end(),
-                       [&effect](const diagnosis::Candidate& c) { return c.effect == effect; });
-}
-
-/// Of the most probable set that was refitted and holds the effect.
-const Refit* refit_of(const Findings& found, const std::string& effect) {
-  for (const Refit& refit : found.refits)
-    if (refit.solved && std::find(refit.effects.begin(), refit.effects.end(), effect) != refit.effects.end())
-      return &refit;
-  return nullptr;
-}
-
-std::vector<std::string> rivals_of(const Findings& found, const std::string& effect) {
-  std::vector<std::string> names;
-  if (found.diagnosis.verdict != Verdict::ambiguous) return names;
-  const auto& set = found.diagnosis.missing;
-  if (std::find(set.begin(), set.end(), effect) == set.end()) return names;
-  for (const std::string& other : set)
-    if (other != effect) names.push_back(other);
-  return names;
-}
-
-/// Of the refit where there is one, else of the linear step.
-Json parameters_json(const diagnosis::Candidate& candidate, const Score& score, const Refit* refit) {
-  Json list = Json::array();
-  if (refit != nullptr) {
-    for (const auto& p : refit->parameters)
-      if (p.name.starts_with(candidate.effect + "."))
-        list.push_back({{"name", p.name},
-                        {"value", p.value},
-                        {"unit", p.unit},
-                        {"interval95", {p.low, p.high}},
-                        {"at_bound", p.end != diagnosis::RangeEnd::none}});
-    return list;
-  }
-  for (Eigen::Index k = 0; k < score.step.size(); ++k) {
-    const auto& p = candidate.parameters[static_cast<std::size_t>(k)];
-    const double reach = normal_reach95() * score.step_sd[k];
-    list.push_back({{"name", p.name},
-                    {"value", score.step[k]},
-                    {"unit", p.unit},
-                    {"interval95", {score.step[k] - reach, score.step[k] + reach}}});
-  }
-  return list;
-}
-
-Json finite_json(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-Json candidate_json(const Findings& found, const Score& score) {
-  const Refit* refit = refit_of(found, score.effect);
-  return {{"effect", score.effect},
-          {"probability", found.included_of(score.effect).probability},
-          {"p_value", score.p_value},
-          {"predicted_rms_mm", score.predicted_rms_mm},
-          {"refit_rms_mm", refit ? Json(refit->rms_mm) : Json(nullptr)},
-          {"held_out_rms_mm", refit ? refit->held_out_rms_mm : score.predicted_held_out_rms_mm},
-          {"parameters", parameters_json(candidate_of(found, score.effect), score, refit)},
-          {"not_told_apart_from", rivals_of(found, score.effect)},
-          {"same_shape_as", score.not_told_apart_from},
-          {"statistic", score.statistic},
-          {"freedom", score.freedom},
-          {"at_border", refit ? Json(refit->at_border) : Json(nullptr)},
-          {"wrong_sign", score.wrong_sign},
-          {"beyond_range", score.beyond_range},
-          {"predicted_held_out_rms_mm", score.predicted_held_out_rms_mm},
-          {"noncentrality", score.noncentrality},
-          {"power", score.power},
-          {"named_half_at", finite_json(diagnosis::size_named(found, score, 0.5))},
-          {"named_mostly_at", finite_json(diagnosis::size_named(found, score, 0.9))}};
-}
-
-Json names_of(const Findings& found, const diagnosis::Hypothesis& h) {
-  Json names = Json::array();
-  for (const int effect : h.effects) names.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);
-  return names;
-}
-
-Json hypotheses_json(const Findings& found) {
-  Json list = Json::array();
-  for (const auto& [one, left] : found.told())
-    list.push_back({{"effects", names_of(found, *one)},
-                    {"probability", one->probability},
-                    {"refitted", one->refitted || one->effects.empty()},
-                    {"unexplained_mm", left.mean_mm},
-                    {"unexplained95", {left.low_mm, left.high_mm}}});
-  return list;
-}
-
-/// A local cause that no effect lists: how likely, of which kind, and where.
-Json unlisted_json(const diagnosis::Unlisted& found) {
-  Json kinds = Json::object();
-  for (std::size_t kind = 0; kind < diagnosis::local_kinds; ++kind)
-    kinds[diagnosis::local_kind_name(static_cast<diagnosis::LocalKind>(kind))] = found.by_kind[kind];
-  const bool moved = found.kind == diagnosis::LocalKind::muscle;
-  const auto value = [moved](double size) { return moved ? size : std::exp(size); };
-  Json effect;
-  if (found.effect) {
-    effect["name"] = found.effect->name;
-    for (const auto& [name, number] : found.effect->parameters) effect[name] = number.value;
-    for (const auto& [name, option] : found.effect->options) effect[name] = option;
-  }
-  return {{"probability", found.probability},
-          {"effect", effect},
-          {"by_kind", kinds},
-          {"likeliest", diagnosis::local_kind_name(found.kind)},
-          {"place_mm", {found.place_mm.x(), found.place_mm.y(), found.place_mm.z()}},
-          {"within_mm", found.within_mm},
-          {moved ? "moved_mm" : "times_as_stiff", value(found.size)},
-          {"interval95", {value(found.low), value(found.high)}}};
-}
-
-/// 1 sigma of a number where the effect is not missing: that of the nuisance which the effect replaces, else 0.
-double null_sd(const Findings& found, const std::string& number) {
-  for (const diagnosis::Nuisance& nuisance : found.base.nuisances)
-    if (nuisance.name() == "/" + number) return nuisance.sigma;
-  return 0;
-}
-
-/// Every effect by itself, as the evidence of many patients is put together from (cohort/population.h): posterior and
-/// prior of its numbers, as offsets from the null, and how far the usual size of one moves the fitted points.
-Json singles_json(const Findings& found) {
-  const auto nothing = std::find_if(found.hypotheses.begin(), found.hypotheses.end(),
-                                    [](const diagnosis::Hypothesis& h) { return h.effects.empty(); });
-  Json list = Json::array();
-  for (const diagnosis::Hypothesis& h : found.hypotheses) {
-    if (h.effects.size() != 1) continue;
-    const diagnosis::Candidate& candidate = found.candidates[static_cast<std::size_t>(h.effects.front())];
-    const Refit* refit = found.refit_of({candidate.effect});
-    Json numbers = Json::array();
-    for (std::size_t k = 0; k < candidate.parameters.size(); ++k) {
-      const diagnosis::CandidateParameter& p = candidate.parameters[k];
-      const auto prior = diagnosis::strength_prior(*simulation::find_parameter(p.name));
-      std::pair<double, double> known;
-      const int place = h.place_of(p.name);
-      if (refit != nullptr && refit->solved) {
-        const auto fitted = std::find_if(refit->parameters.begin(), refit->parameters.end(),
-                                         [&p](const diagnosis::FittedParameter& f) { return f.name == p.name; });
-        if (fitted == refit->parameters.end()) continue;
-        known = {fitted->value - p.null, (fitted->high - fitted->low) / (2 * normal_reach95())};
-      } else if (place >= 0) {
-        known = h.weighed.number(place);
-      } else {
-        continue;
-      }
-      const Eigen::VectorXd usual =
-          candidate.secant.size() > 0
-              ? candidate.secant
-              : Eigen::VectorXd(candidate.slope.col(static_cast<Eigen::Index>(k)) * (p.typical - p.null));
-      numbers.push_back(
-          {{"name", p.name},
-           {"mean", known.first},
-           {"sd", known.second > 0 ? Json(known.second) : Json(nullptr)},  // none: cut at one end of the range
-           {"prior_mean", prior.mean() - p.null},
-           {"prior_sd", prior.sd()},
-           {"null_sd", null_sd(found, p.name)},
-           {"usual", p.typical - p.null},
-           {"usual_moves_mm", rms(usual)}});
-    }
-    list.push_back({{"effect", candidate.effect},
-                    {"ln_bayes_factor", h.ln_evidence - nothing->ln_evidence},
-                    {"numbers", numbers}});
-  }
-  return list;
-}
-
-Json included_json(const Findings& found) {
-  Json list = Json::array();
-  for (const diagnosis::Inclusion& one : found.included) {
-    Json numbers = Json::array();
-    for (const diagnosis::FittedParameter& p : diagnosis::over_sets(found, one.effect))
-      numbers.push_back({{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"interval95", {p.low, p.high}}});
-    list.push_back({{"effect", one.effect},
-                    {"probability", one.probability},
-                    {"bayes_factor", one.bayes_factor},
-                    {"left_out_gain", one.left_out_gain},
-                    {"ends_at", one.ends_at},
-                    {"numbers", numbers}});
-  }
-  return list;
-}
 
 Json registration_json(const Findings& found) {
   Json list = Json::array();
@@ -310,15 +124,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["missing"] = found.diagnosis.missing;
   f["why"] = found.diagnosis.why;
   f["ambiguous_rest"] = found.diagnosis.ambiguous_rest;
-  f["under_other_priors"] = Json::array();
-  for (const diagnosis::OtherPrior& other : found.under_other_priors) {
-    Json one = {{"what", other.what},
-                {"verdict", diagnosis::verdict_name(other.diagnosis.verdict)},
-                {"missing", other.diagnosis.missing},
-                {"included", Json::object()}};
-    for (const diagnosis::Inclusion& i : other.included) one["included"][i.effect] = i.probability;
-    f["under_other_priors"].push_back(std::move(one));
-  }
+  f["under_other_priors"] = other_priors_json(found);
   f["hypotheses"] = hypotheses_json(found);
   f["included"] = included_json(found);
   f["singles"] = singles_json(found);
@@ -327,10 +133,7 @@ Json diagnosis_figures(const DiagnosisResult& result) {
   f["unlisted"] = unlisted_json(found.unlisted);
   f["unexplained_bound_mm"] = found.priors.unexplained_bound_mm;
   f["registration"] = registration_json(found);
-  f["candidates"] = Json::array();
-  for (const diagnosis::Inclusion& one : found.included)  // most probable first
-    for (const Score& score : found.table.scores)
-      if (score.effect == one.effect) f["candidates"].push_back(candidate_json(found, score));
+  f["candidates"] = candidates_json(found);
   f["errors_beside"] = found.errors_beside();
   f["creased_points"] = found.base.creased_points;
   f["base_mae_mm"] = found.base.fit.residuals.skin_mm().cwiseAbs().mean();

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "common/error.h"
@@ -171,7 +172,76 @@ TEST(ModelToScan, RefusesBadBounds) {
   EXPECT_THROW(model_to_scan(scan, points, normals.topRows(3), {}, result), InputError);
 }
 
-TEST(ModelSkin, QuadraticFaceIsFourFlatTrianglesOverItsSixNodes) {
+/// A sphere of quadratic faces, their nodes on it.
+meshing::TetMesh curved_sphere(double radius, int level) {
+  const auto coarse = testing::sphere(radius, level);
+  std::map<std::pair<int, int>, int> middles;
+  std::vector<Eigen::RowVector3d> points;
+  for (Eigen::Index p = 0; p < coarse.points.rows(); ++p) points.emplace_back(coarse.points.row(p));
+  meshing::TetMesh mesh;
+  mesh.faces.resize(coarse.triangles.rows(), 6);
+  mesh.faces.leftCols(3) = coarse.triangles;
+  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f)
+    for (int a = 0; a < 3; ++a) {
+      const int from = mesh.faces(f, a), to = mesh.faces(f, (a + 1) % 3);
+      const auto [at, added] = middles.try_emplace(std::minmax(from, to), static_cast<int>(points.size()));
+      const Eigen::RowVector3d between = points[static_cast<std::size_t>(from)] + points[static_cast<std::size_t>(to)];
+      if (added) points.emplace_back(radius * between.normalized());
+      mesh.faces(f, 3 + a) = at->second;
+    }
+  mesh.points.resize(static_cast<Eigen::Index>(points.size()), 3);
+  for (std::size_t p = 0; p < points.size(); ++p) mesh.points.row(static_cast<Eigen::Index>(p)) = points[p];
+  mesh.region = Eigen::VectorXi::Constant(mesh.faces.rows(), 2);
+  return mesh;
+}
+
+TEST(ModelSkin, DistancesAreThoseToCurvedFaces) {
+  const meshing::TetMesh mesh = curved_sphere(50, 2);  // edges of 15 mm: a flat face would be off by 0.56 mm
+  const ModelSkin model(mesh, mesh.points);
+  for (const double radius : {44.0, 53.0}) {
+    const Points queries = radius * testing::random_points(300, -1, 1, 4).rowwise().normalized();
+    SignedDistances distances;
+    scan_to_model(model, queries, distances);
+    EXPECT_LT((distances.distance_mm.array() - (radius - 50)).abs().maxCoeff(), 0.07);
+    EXPECT_LT((distances.distance_mm.array() - (radius - 50)).abs().mean(), 0.05);
+    const ClosestPoints& closest = distances.closest;
+    ASSERT_EQ(closest.node.cols(), 6);
+    EXPECT_LT((closest.weight.rowwise().sum().array() - 1).abs().maxCoeff(), 1e-12);
+    for (Eigen::Index i = 0; i < queries.rows(); ++i) {
+      Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+      for (int k = 0; k < 6; ++k) sum += closest.weight(i, k) * mesh.points.row(closest.node(i, k));
+      ASSERT_LT((sum - closest.point.row(i)).norm(), 1e-9);
+      const Eigen::RowVector3i quarter = model.triangles().row(closest.triangle[i]);
+      for (const int node : quarter)
+        ASSERT_LT((mesh.points.row(node) - closest.point.row(i)).norm(), 9.5) << "a corner of the quarter it lies in";
+    }
+  }
+}
+
+TEST(ModelSkin, CurvedFacesMoveDistancesAsTheirNodesDo) {
+  const meshing::TetMesh mesh = curved_sphere(50, 2);
+  const Points scan = 53 * testing::random_points(400, -1, 1, 11).rowwise().normalized();
+  const Points move = testing::random_points(static_cast<int>(mesh.points.rows()), -1, 1, 12);
+  const Eigen::VectorXd factor = testing::random_points(400, 0.5, 1, 14).col(0);
+  ModelSkin model(mesh, mesh.points);
+  SignedDistances distances;
+  const auto value = [&](double s) {
+    model.move(mesh.points + s * move);
+    scan_to_model(model, scan, distances);
+    return factor.dot(distances.distance_mm);
+  };
+  value(0);
+  const Points unit = direction(scan, distances);
+  double slope = 0;
+  for (int i = 0; i < scan.rows(); ++i)
+    for (int k = 0; k < 6; ++k)
+      slope -= factor[i] * distances.closest.weight(i, k) * unit.row(i).dot(move.row(distances.closest.node(i, k)));
+  ASSERT_GT(std::abs(slope), 1);
+  EXPECT_GT(taylor_order(value, slope), 1.9);
+  EXPECT_LT(taylor_order(value, 1.01 * slope), 1.1);
+}
+
+TEST(ModelSkin, QuadraticFaceIsFourFlatTrianglesForAreasAndPictures) {
   meshing::TetMesh mesh;
   mesh.points.resize(6, 3);
   mesh.points << 0, 0, 0, 8, 0, 0, 0, 8, 0, 4, 0, 1, 4, 4, 1, 0, 4, 1;
@@ -182,11 +252,11 @@ TEST(ModelSkin, QuadraticFaceIsFourFlatTrianglesOverItsSixNodes) {
   EXPECT_EQ(model.triangles().rows(), 4);
   EXPECT_EQ(model.nodes().size(), 6u);
   Points query(1, 3);
-  query << 2.7, 2.7, 4;  // over the middle triangle, which lies at z = 1
+  query << 8. / 3, 8. / 3, 5;  // over the middle of the face, which lies at z = 4/3
   SignedDistances distances;
   scan_to_model(model, query, distances);
-  EXPECT_NEAR(distances.distance_mm[0], 3, 1e-12);
-  EXPECT_EQ(distances.closest.node.row(0), Eigen::RowVector3i(3, 4, 5));
+  EXPECT_NEAR(distances.distance_mm[0], 5 - 4. / 3, 0.1);
+  EXPECT_EQ(distances.closest.triangle[0], 3) << "the quarter in the middle";
   EXPECT_GT(model.node_normals().col(2).minCoeff(), 0.8);
 }
 

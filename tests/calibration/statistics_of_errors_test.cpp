@@ -66,6 +66,31 @@ TEST(Noise, IsFoundUnderAModelErrorTenTimesAsLong) {
   }
 }
 
+TEST(Noise, IsNotLowByPointsThatErrAlikeLyingNearer) {
+  constexpr double spacing_mm = 2.4, noise_mm = 0.7;
+  std::mt19937 generator(5);
+  std::normal_distribution<double> normal(0, noise_mm);
+  Points on_skin(3600, 3), place;
+  Eigen::VectorXd distance_mm(3600);
+  for (int i = 0; i < 3600; ++i) {
+    on_skin.row(i) << spacing_mm * (i % 60), spacing_mm * (i / 60), 0;
+    distance_mm[i] = normal(generator);
+  }
+  place = on_skin;
+  place.col(2) = distance_mm;
+  EXPECT_NEAR(estimate_noise_mm(on_skin, distance_mm), noise_mm, 0.02);
+  EXPECT_LT(estimate_noise_mm(place, distance_mm), estimate_noise_mm(on_skin, distance_mm));
+}
+
+TEST(Noise, OfPointsOnARidgeIsFound) {
+  std::mt19937 generator(6);
+  std::normal_distribution<double> normal(0, 0.7);
+  Points line = Points::Zero(400, 3);
+  Eigen::VectorXd distance_mm(400);
+  for (int i = 0; i < 400; ++i) line(i, 0) = 0.5 * i, distance_mm[i] = normal(generator);
+  EXPECT_NEAR(estimate_noise_mm(line, distance_mm), 0.7, 0.08);
+}
+
 TEST(Noise, NeedsPoints) {
   const Residuals r = patch(39, 0.7, 0, 10, 1);
   EXPECT_THROW(estimate_noise_mm(r.place, r.distance_mm), InputError);

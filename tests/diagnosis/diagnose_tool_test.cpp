@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // What the built tool tells beside its answer, on the run that the tests of the pipeline share.
+#include <fmt/core.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -109,6 +110,31 @@ TEST_F(DiagnoseTool, HoldsWhatIsBelievedOfTheNumberOfEffects) {
   };
   const double usual = nothing("0.5,0.3,0.15,0.05"), sure = nothing("0.97,0.01,0.01,0.01");
   EXPECT_GT(sure, usual);
+}
+
+TEST_F(DiagnoseTool, SaysWhatOtherPriorsAndLessTrustWouldChangeAndNothingElse) {
+  const Finished finished = diagnose({"--no-other-meshes"});
+  ASSERT_EQ(finished.code, 0) << finished.err;
+  const Json json = Json::parse(read_text(found_ / "diagnosis.json"));
+  const Json& others = json.at("under_other_priors");
+  ASSERT_EQ(others.size(), 5u);
+  EXPECT_EQ(others.back().at("what"), "the scans counting for half");
+  for (const Json& other : others) {
+    const bool changes = other.at("verdict") != json.at("verdict") || other.at("missing") != json.at("missing");
+    const std::string what = other.at("what");
+    EXPECT_EQ(finished.out.find("  with " + what) != std::string::npos, changes) << what << "\n" << finished.out;
+    for (const Json& one : json.at("included")) {
+      const double stated = one.at("probability"), then = other.at("included").at(one.at("effect"));
+      EXPECT_TRUE(then >= 0 && then <= 1) << what;
+      if (changes && stated > 0.5) EXPECT_NE(then, stated) << what;
+    }
+    for (const Json& name : other.at("missing"))
+      if (changes) {
+        const std::string words =
+            fmt::format("{} {:.2f}", name.get<std::string>(), other["included"][name].get<double>());
+        EXPECT_NE(finished.out.find(words), std::string::npos) << words << " is not in:\n" << finished.out;
+      }
+  }
 }
 
 TEST_F(DiagnoseTool, WarnsWhereTheMeshIsTakenToBeExact) {

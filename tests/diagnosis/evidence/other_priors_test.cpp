@@ -86,6 +86,23 @@ TEST(OtherPriors, ScansThatCountForHalfSayHalfOfWhatIsNotListed) {
   EXPECT_NEAR(then / (1 - then), std::sqrt(plain) / (rest + with_gain(2)), 1e-9);
 }
 
+TEST(OtherPriors, ScansThatCountForHalfSayHalfOfErrorsMeasuredBesideAnEffect) {
+  Sheet sheet = just_named();
+  const double stated = sheet.included.front().probability;
+  BaseFit beside;
+  beside.errors = sheet.base.errors, beside.kernel = sheet.base.kernel;
+  beside.scale_mm = sheet.base.scale_mm, beside.most_mm = sheet.base.most_mm;
+  beside.ln_weight = 3;
+  for (Hypothesis& h : sheet.hypotheses)
+    if (!h.effects.empty()) h.ground = &beside;
+  normalise(sheet.hypotheses);
+  sheet.included = inclusions(sheet.hypotheses, sheet.effects, sheet.priors);
+  const auto odds = [](double p) { return p / (1 - p); };
+  const double with = sheet.included.front().probability, then = sheet.others().back().included.front().probability;
+  EXPECT_NEAR(odds(with) / odds(stated), std::exp(3), 1e-6);
+  EXPECT_NEAR(odds(then), std::sqrt(odds(with)), 1e-6);
+}
+
 TEST(OtherPriors, DoNotChangeWhatIsPlain) {
   for (const double seen_mm : {0.0, 1.5})
     for (const OtherPrior& other : Sheet(seen_mm).others())

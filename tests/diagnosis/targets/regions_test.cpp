@@ -103,7 +103,7 @@ TEST(PlacesOfTargets, NearestSkinAndTheSkinAboveAreOnTheSkin) {
   const Places places = places_of(asked.twin.mesh, asked.question.imaged, x, up);
   const calibration::ModelSkin skin(asked.twin.mesh, x);
   calibration::ClosestPoints closest;
-  skin.distance().closest(places.there, closest);
+  skin.closest(places.there, closest);
   int over = 0;
   for (Eigen::Index p = 0; p < 4; ++p) {
     const Eigen::Vector3d target = places.there.row(p), near = places.there.row(4 + p), above = places.there.row(8 + p);

@@ -55,6 +55,16 @@ GreyImage series(const Grid& grid, double fat, double gland, double noise, const
 
 const auto in_place = [](const Vector3d& p) { return p; };
 
+/// The share of gland as the holes in the fat lie, which were moved by @p fat_shift.
+std::vector<float> holes_share(const Grid& grid, const Vector3d& fat_shift) {
+  std::vector<float> share;
+  for (int k = 0; k < grid.size.z(); ++k)
+    for (int j = 0; j < grid.size.y(); ++j)
+      for (int i = 0; i < grid.size.x(); ++i)
+        share.push_back(static_cast<float>(gland_at(grid.point(Vector3d(i, j, k)) - fat_shift)));
+  return share;
+}
+
 /// A breast hanging from a chest, in a series without fat suppression.
 struct Breast {
   Grid grid = grid_of(56, 56, 56, 2, Vector3d::Zero());
@@ -72,10 +82,17 @@ struct Breast {
           truth.push_back(gland_at(p) > 0.5);
         }
   }
-  double dice(const Mask& gland) const {
+  double dice(const Mask& gland) const { return dice_of(gland, truth); }
+  static double dice_of(const Mask& a, const Mask& b) {
     double both = 0, sum = 0;
-    for (std::size_t n = 0; n < truth.size(); ++n) both += gland[n] && truth[n], sum += gland[n] + truth[n];
+    for (std::size_t n = 0; n < a.size(); ++n) both += a[n] && b[n], sum += a[n] + b[n];
     return 2 * both / sum;
+  }
+  /// Where the holes in the fat lie, which the scanner moved.
+  Mask holes(const Vector3d& fat_shift) const {
+    Mask mask;
+    for (const float share : holes_share(grid, fat_shift)) mask.push_back(share > 0.5F);
+    return mask;
   }
 };
 
@@ -128,21 +145,11 @@ TEST(ShareByBoth, WeighsEachByWhatItTells) {
   EXPECT_NEAR(alone.deviation[0], 0.1 / 0.7, 1e-6);
 }
 
-/// The share of gland as the holes in the fat lie, which were moved by @p fat_shift.
-std::vector<float> holes(const Grid& grid, const Vector3d& fat_shift) {
-  std::vector<float> share;
-  for (int k = 0; k < grid.size.z(); ++k)
-    for (int j = 0; j < grid.size.y(); ++j)
-      for (int i = 0; i < grid.size.x(); ++i)
-        share.push_back(static_cast<float>(gland_at(grid.point(Vector3d(i, j, k)) - fat_shift)));
-  return share;
-}
-
 TEST(FatShift, IsFoundAlongItsAxisAndNoneWhereThereIsNone) {
   const Breast b;
   for (const Vector3d& shift : {Vector3d(2, 0, 0), Vector3d(0, 0, -1.5), Vector3d(0, 0, 0)}) {
     const GreyImage image = series(b.grid, 100, 40, 2, in_place, shift);
-    const FatShift found = find_fat_shift(image, holes(b.grid, shift), b.breast);
+    const FatShift found = find_fat_shift(image, holes_share(b.grid, shift), b.breast);
     EXPECT_LT((found.fat_mm - shift).norm(), 0.51) << shift.transpose();
     EXPECT_LT(found.laid_mm.norm(), 0.51) << shift.transpose();
   }
@@ -183,9 +190,29 @@ TEST(GlandByOneSeries, IsPutBackWhereFatLiesAsideAndElseLeft) {
   EXPECT_FALSE(find_gland(series(b.grid, 100, 40, 2, in_place), b.place, {}).fat_shift_mm);
   GlandOptions left, bright;
   left.find_fat_shift = false;
-  EXPECT_FALSE(find_gland(series(b.grid, 100, 40, 2, in_place, fat_shift), b.place, left).fat_shift_mm);
+  const GlandResult as_in_grey = find_gland(series(b.grid, 100, 40, 2, in_place, fat_shift), b.place, left);
+  EXPECT_FALSE(as_in_grey.fat_shift_mm);
+  EXPECT_GT(Breast::dice_of(as_in_grey.gland, b.holes(fat_shift)), b.dice(as_in_grey.gland) + 0.05);
   bright.contrast = GlandOptions::Contrast::bright;
   EXPECT_FALSE(find_gland(series(b.grid, 30, 120, 3, in_place, fat_shift), b.place, bright).fat_shift_mm);
+}
+
+TEST(GlandByTwoSeries, FatThatIsNotLookedForIsNotMoved) {
+  const Breast b;
+  const Vector3d fat_shift(4, 0, 0);
+  const GreyImage first = series(b.grid, 100, 40, 4, in_place, fat_shift);
+  const GreyImage second = series(b.grid, 30, 120, 8, in_place);
+  GlandOptions options;
+  options.second = GlandOptions::Contrast::bright;
+  options.find_fat_shift = false;
+  const GlandResult left = find_gland(first, b.place, options, &second);
+  ASSERT_TRUE(left.second);
+  EXPECT_TRUE(left.second->fat_shift_mm.isZero(0));
+  EXPECT_FALSE(left.fat_shift_mm);
+  options.find_fat_shift = true;
+  const GlandResult back = find_gland(first, b.place, options, &second);
+  EXPECT_LT((back.second->fat_shift_mm - fat_shift).norm(), 0.76);
+  EXPECT_GT(b.dice(back.gland), b.dice(left.gland) + 0.03);
 }
 
 TEST(GlandByTwoSeries, IsBetterThanByTheNoisierAndLiesWhereTheGlandIs) {

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#include "diagnosis/evidence/mean_kernel.h"
+
+#include <Eigen/Cholesky>
+#include <functional>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "calibration/work_limit.h"
+#include "common/error.h"
+#include "common/side_by_side.h"
+#include "diagnosis/evidence/discrepancy.h"
+#include "diagnosis/evidence/linear_evidence.h"
+#include "diagnosis/weighted_fit.h"
+
+namespace supine::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int draws = 4;
+constexpr unsigned seed = 1;
+
+/// Offsets from the fit, each with that of the opposite sign: two draws and their mirror images.
+std::vector<VectorXd> draw_offsets(const BaseFit& base) {
+  const LinearEvidence evidence(*base.covariance, base.distances(base.fit.residuals),
+                                directions_at(base.fit, *base.parameters, base.nuisances, base.clusters));
+  std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
+  std::iota(all.begin(), all.end(), 0);
+  const Weighed weighed = evidence.weigh(all);
+  Index likeliest;
+  weighed.size_probability.maxCoeff(&likeliest);
+  const auto bin = static_cast<std::size_t>(likeliest);
+  const MatrixXd root = weighed.covariance[bin].llt().matrixL();
+  std::mt19937_64 generator(seed);
+  std::normal_distribution<double> normal;
+  std::vector<VectorXd> offsets;
+  for (int k = 0; k < draws; k += 2) {
+    const VectorXd away = root * VectorXd::NullaryExpr(root.rows(), [&] { return normal(generator); });
+    offsets.push_back(weighed.mean[bin] + away);
+    offsets.push_back(weighed.mean[bin] - away);
+  }
+  return offsets;
+}
+
+/// K of the fit with its numbers moved. @throws NumericalFailure  no equilibrium there
+MatrixXd kernel_at(const calibration::MeasuredScene& scene, const BaseFit& base, const VectorXd& offset) {
+  const Index own = base.fit.u.size();
+  JointTrial trial{base.parameters->clamped(base.fit.u + offset.head(own)), base.nuisances};
+  for (std::size_t k = 0; k < trial.nuisances.size(); ++k)
+    trial.nuisances[k].value += offset[own + static_cast<Index>(k)];
+  const simulation::Model model = with_nuisances(base.parameters->model(trial.u), trial.nuisances, poses_of(scene));
+  calibration::Evaluator evaluator(scene, model, accurate_enough());
+  const calibration::TrialLimit limit(evaluator.chain(), base.fit.prediction.solution.dearest_solve);
+  const simulation::ChainSolution near = expected_at(trial, base.fit, base.nuisances);
+  const calibration::Prediction prediction = evaluator.predict(model, &near);
+  const calibration::Residuals residuals = calibration::residuals_of(scene, prediction, base.fit.mask, base.noise_mm);
+  const simulation::Sensitivities sensitivities(evaluator.chain(), model, prediction.solution);
+  return discrepancy_of(*scene.mesh, sensitivities, prediction, residuals, base.clusters).kernel;
+}
+
+}  // namespace
+
+MatrixXd mean_kernel(const calibration::MeasuredScene& scene, const BaseFit& base) {
+  const std::vector<VectorXd> offsets = draw_offsets(base);
+  std::vector<MatrixXd> kernels(offsets.size());
+  std::vector<std::function<void()>> works;
+  for (std::size_t k = 0; k < offsets.size(); ++k)
+    works.emplace_back([&, k] {
+      try {
+        kernels[k] = kernel_at(scene, base, offsets[k]);
+      } catch (const NumericalFailure&) {
+        // such numbers carry no body
+      }
+    });
+  side_by_side(works);
+  MatrixXd sum = MatrixXd::Zero(base.kernel.rows(), base.kernel.cols());
+  int solved = 0;
+  for (const MatrixXd& kernel : kernels)
+    if (kernel.size() > 0) sum += kernel, ++solved;
+  if (solved == 0) return base.kernel;
+  return sum / solved;
+}
+
+}  // namespace supine::diagnosis
