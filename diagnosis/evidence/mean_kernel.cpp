@@ -77,11 +77,10 @@ MatrixXd mean_kernel(const calibration::MeasuredScene& scene, const BaseFit& bas
       }
     });
   side_by_side(works);
-  MatrixXd sum = MatrixXd::Zero(base.kernel.rows(), base.kernel.cols());
-  int solved = 0;
+  MatrixXd sum = base.kernel;
+  int solved = 1;
   for (const MatrixXd& kernel : kernels)
     if (kernel.size() > 0) sum += kernel, ++solved;
-  if (solved == 0) return base.kernel;
   return sum / solved;
 }
 
