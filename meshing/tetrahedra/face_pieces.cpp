@@ -1,75 +1,96 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "meshing/tetrahedra/face_pieces.h"
 
-#include <array>
+#include <algorithm>
 #include <map>
-#include <vector>
+#include <utility>
 
 #include "common/error.h"
-#include "meshing/topology.h"
 
 namespace supine::meshing {
 namespace {
 
-constexpr int pieces = 4;  // along an edge
+constexpr int parts = 4;  // of an edge; even, so that no triangle lies in two quarters
+constexpr int nodes_of_face = 6;
 
-/// Points of the boundary's faces, those on an edge once.
-class Lattice {
- public:
-  explicit Lattice(const TetMesh& mesh) : mesh_(mesh) {}
+/// The quadratic shape functions of a triangle (Zienkiewicz, Taylor and Zhu, The finite element method, 7th ed., §6.2).
+Eigen::RowVectorXd shape_functions(const FacePiece::Parts& at) {
+  const Eigen::Vector3d l = Eigen::Vector3d(at[0], at[1], at[2]) / parts;
+  Eigen::RowVectorXd n(nodes_of_face);
+  for (int a = 0; a < 3; ++a) n[a] = l[a] * (2 * l[a] - 1), n[3 + a] = 4 * l[a] * l[(a + 1) % 3];
+  return n;
+}
 
-  /// @param i, j  steps from corner 0 toward corners 1 and 2 of face f, i + j <= pieces
-  int point(Eigen::Index f, int i, int j) {
-    const std::array<int, 3> steps{pieces - i - j, i, j};
-    Key key{static_cast<int>(f), i, j, -1};
-    for (int k = 0; k < 3; ++k) {
-      const int from = mesh_.faces(f, (k + 1) % 3), to = mesh_.faces(f, (k + 2) % 3);
-      const int at = steps[static_cast<std::size_t>((k + 2) % 3)];
-      if (steps[static_cast<std::size_t>(k)] == 0)
-        key = from < to ? Key{-1, from, to, at} : Key{-1, to, from, pieces - at};
+/// Corners of the small triangles of a face, counter-clockwise as the face.
+std::vector<std::array<FacePiece::Parts, 3>> cut_face() {
+  std::vector<std::array<FacePiece::Parts, 3>> all;
+  const auto at = [](int i, int j) { return FacePiece::Parts{parts - i - j, i, j}; };
+  for (int i = 0; i < parts; ++i)
+    for (int j = 0; i + j < parts; ++j) {
+      all.push_back({at(i, j), at(i + 1, j), at(i, j + 1)});
+      if (i + j + 2 <= parts) all.push_back({at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
     }
-    for (int k = 0; k < 3; ++k)
-      if (steps[static_cast<std::size_t>(k)] == pieces) key = {-1, mesh_.faces(f, k), -1, 0};
-    const auto [place, added] = number_.try_emplace(key, static_cast<int>(points_.size()));
-    if (added) points_.push_back(face_point(mesh_.points, mesh_.faces, f, double(i) / pieces, double(j) / pieces));
-    return place->second;
-  }
+  return all;
+}
 
-  Points points() const {
-    Points all(static_cast<Eigen::Index>(points_.size()), 3);
-    for (Eigen::Index p = 0; p < all.rows(); ++p) all.row(p) = points_[static_cast<std::size_t>(p)];
-    return all;
-  }
+int quarter_of(const std::array<FacePiece::Parts, 3>& piece) {
+  for (int a = 0; a < 3; ++a)
+    if (2 * std::min({piece[0][a], piece[1][a], piece[2][a]}) >= parts) return a;
+  return 3;
+}
 
- private:
-  using Key = std::array<int, 4>;  // of a point inside a face, on an edge, at a corner
-  const TetMesh& mesh_;
-  std::map<Key, int> number_;
-  std::vector<Eigen::RowVector3d> points_;
-};
+/// A place of an edge has one name in both of its faces: the corners that take part, with their shares.
+std::vector<std::pair<int, int>> name_of(const FacePiece::Parts& at, const int* face) {
+  std::vector<std::pair<int, int>> name;
+  for (std::size_t a = 0; a < 3; ++a)
+    if (at[a] > 0) name.emplace_back(face[a], at[a]);
+  std::sort(name.begin(), name.end());
+  return name;
+}
 
 }  // namespace
 
+const std::vector<FacePiece>& pieces_of_face() {
+  static const std::vector<FacePiece> all = [] {
+    std::vector<FacePiece> list;
+    for (const auto& corners : cut_face()) {
+      FacePiece piece{corners, {}, quarter_of(corners)};
+      for (int k = 0; k < 3; ++k) piece.shapes.row(k) = shape_functions(corners[static_cast<std::size_t>(k)]);
+      list.push_back(piece);
+    }
+    return list;
+  }();
+  return all;
+}
+
+CutFaces cut_faces(const Indices& faces) {
+  constexpr int pieces = FacePiece::per_face;
+  CutFaces cut;
+  cut.triangles.resize(pieces * faces.rows(), 3);
+  std::map<std::vector<std::pair<int, int>>, int> known;
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index f = 0; f < faces.rows(); ++f)
+    for (int p = 0; p < pieces; ++p) {
+      const FacePiece& piece = pieces_of_face()[static_cast<std::size_t>(p)];
+      for (int k = 0; k < 3; ++k) {
+        const auto [at, added] = known.try_emplace(
+            name_of(piece.corners[static_cast<std::size_t>(k)], faces.row(f).data()), static_cast<int>(known.size()));
+        cut.triangles(pieces * f + p, k) = at->second;
+        for (int a = 0; added && a < faces.cols(); ++a)
+          if (piece.shapes(k, a) != 0) entries.emplace_back(at->second, faces(f, a), piece.shapes(k, a));
+      }
+    }
+  cut.weights.resize(static_cast<Eigen::Index>(known.size()), faces.maxCoeff() + 1);
+  cut.weights.setFromTriplets(entries.begin(), entries.end());
+  return cut;
+}
+
 reconstruction::Surface face_pieces(const TetMesh& mesh) {
   if (mesh.order() != 2) throw InputError("only faces of quadratic tetrahedra are bent; this mesh is linear");
-  Lattice lattice(mesh);
-  reconstruction::Surface surface;
-  surface.triangles.resize(pieces * pieces * mesh.faces.rows(), 3);
-  surface.region.resize(surface.triangles.rows());
-  Eigen::Index t = 0;
-  const auto add = [&](Eigen::Index f, int a, int b, int c) {
-    surface.triangles.row(t) << a, b, c;
-    surface.region[t++] = mesh.region[f];
-  };
-  for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f)
-    for (int i = 0; i < pieces; ++i)
-      for (int j = 0; i + j < pieces; ++j) {
-        add(f, lattice.point(f, i, j), lattice.point(f, i + 1, j), lattice.point(f, i, j + 1));
-        if (i + j + 1 < pieces)
-          add(f, lattice.point(f, i + 1, j), lattice.point(f, i + 1, j + 1), lattice.point(f, i, j + 1));
-      }
-  surface.points = lattice.points();
-  return surface;
+  const CutFaces cut = cut_faces(mesh.faces);
+  Eigen::VectorXi region(cut.triangles.rows());
+  for (Eigen::Index t = 0; t < region.size(); ++t) region[t] = mesh.region[t / FacePiece::per_face];
+  return {cut.weights * mesh.points.topRows(cut.weights.cols()), cut.triangles, region};
 }
 
 }  // namespace supine::meshing
