@@ -80,4 +80,14 @@ std::vector<FarNuisance> far_nuisances(const std::vector<Nuisance>& nuisances) {
   return list;
 }
 
+std::string too_far_words(const std::vector<Nuisance>& nuisances) {
+  constexpr double too_far = 4;
+  const auto furthest = std::max_element(nuisances.begin(), nuisances.end(), [](const auto& a, const auto& b) {
+    return std::abs(a.value) < std::abs(b.value);
+  });
+  if (furthest == nuisances.end() || std::abs(furthest->value) < too_far) return "";
+  return fmt::format("{} ended {:.1f} sigma from where it is expected", words_of(furthest->name()),
+                     std::abs(furthest->value));
+}
+
 }  // namespace supine::diagnosis

@@ -23,4 +23,8 @@ struct FarNuisance {
 /// Those that are 1.5 sigma off or more, the furthest first.
 std::vector<FarNuisance> far_nuisances(const std::vector<Nuisance>& nuisances);
 
+/// "where the supine scan lies, along x ended 4.6 sigma from where it is expected": the furthest of all, places of
+/// scans too, where that is 4 sigma or more. Otherwise empty.
+std::string too_far_words(const std::vector<Nuisance>& nuisances);
+
 }  // namespace supine::diagnosis

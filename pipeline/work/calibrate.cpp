@@ -156,7 +156,7 @@ class Calibration {
     const diagnosis::JointPosterior posterior = diagnosis::posterior_of(base);
     for (Eigen::Index k = parameters_.size(); k < posterior.value.size(); ++k)
       result.nuisances.push_back({posterior.names[static_cast<std::size_t>(k)], posterior.value[k], posterior.sd[k]});
-    warn_of_far(base);
+    warn_of_makeshift(base);
     result.as_given = as_given(evaluator, base);
     result.fit = std::move(base.fit);
     result.fit.history = std::move(base.history);
@@ -169,18 +169,18 @@ class Calibration {
     return posterior.of_parameters;
   }
 
-  /// A fit that moves what is never known this far makes up for something else with it.
-  void warn_of_far(const diagnosis::BaseFit& base) const {
-    constexpr double far = 4;  // sigma
-    const auto furthest =
-        std::max_element(base.nuisances.begin(), base.nuisances.end(),
-                         [](const auto& a, const auto& b) { return std::abs(a.value) < std::abs(b.value); });
-    if (furthest == base.nuisances.end() || std::abs(furthest->value) < far) return;
-    run_.warn(fmt::format(
-        "{} ended {:.1f} sigma from where it is expected: it makes up for something else, and the moduli with it. Look "
-        "at the scan beside the model (supine-compare, supine-register), fit without it (--method least-squares), or "
-        "ask what is missing (supine-diagnose)",
-        diagnosis::words_of(furthest->name()), std::abs(furthest->value)));
+  /// A fit that moves what is never known very far, or leaves as much as is ever believed, makes up for something else.
+  void warn_of_makeshift(const diagnosis::BaseFit& base) const {
+    std::string what = diagnosis::too_far_words(base.nuisances);
+    if (what.empty() && base.size_mm >= base.covariance->sizes_mm().maxCoeff())
+      what =
+          fmt::format("nothing in the model explains some {:.0f} mm of where the skin lies, the most that is believed",
+                      base.size_mm);
+    if (what.empty()) return;
+    run_.warn(what +
+              ": the fit makes up for something else, and the moduli with it. Look at the scan beside the model "
+              "(supine-compare, supine-register), fit without it (--method least-squares), or ask what is missing "
+              "(supine-diagnose)");
   }
 
   /// The fitted model's errors where scans lie as they were given and nothing else is moved: what supine-compare says.

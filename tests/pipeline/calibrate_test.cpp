@@ -9,6 +9,7 @@
 
 #include "pipeline/case/model_file.h"
 #include "tests/pipeline/process.h"
+#include "tests/pipeline/simulated_scan.h"
 #include "tests/pipeline/small_case.h"
 #include "tests/pipeline/small_run.h"
 #include "tests/pipeline/temporary_folder.h"
@@ -223,21 +224,20 @@ TEST_F(Calibrate, SaysHowFarTheModelIsOffWhereScansLieAsGiven) {
   EXPECT_LT(result["rms_mm"].get<double>(), compared);
 }
 
-TEST_F(Calibrate, NamesWhatIsNeverKnownAndHadToMoveTooFar) {
+TEST_F(Calibrate, WarnsOfAScanThatNothingExplains) {
   const auto warned = [this](const char* to) {
     const Finished finished = run("calibrate", to, {"--method", "joint"});
     EXPECT_LE(finished.code, 1) << finished.err;
-    return finished.err.find("sigma from where it is expected: it makes up for something else") != std::string::npos;
+    return finished.err.find("the fit makes up for something else") != std::string::npos;
   };
+  write_simulated_scan(folder() / "out/supine.vtu", folder() / "simulated.vtp");
+  std::string text = replaced(bytes("case.toml"), "supine.ply", "simulated.vtp");
+  write_text(folder() / "case.toml", text);
   EXPECT_FALSE(warned("in_place"));
-  // A scan 5 mm from where it is said to lie to a tenth of a millimetre.
-  std::string text = bytes("case.toml");
+  // A scan 10 mm from where it is said to lie to a tenth of a millimetre.
   text.insert(text.find("surface"), "registration_mm = 0.1\n");
   write_text(folder() / "case.toml", text);
-  write_scan(folder() / "supine.ply", [](std::array<double, 3> p) {
-    p[1] += 5;
-    return p;
-  });
+  write_simulated_scan(folder() / "out/supine.vtu", folder() / "simulated.vtp", {0, 10, 0});
   EXPECT_TRUE(warned("elsewhere"));
 }
 

@@ -6,15 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
-#include <random>
 #include <sstream>
 
-#include "calibration/model_skin.h"
 #include "meshing/mesh_io.h"
 #include "meshing/supports.h"
 #include "meshing/topology.h"
 #include "reconstruction/surface_io.h"
 #include "tests/pipeline/process.h"
+#include "tests/pipeline/simulated_scan.h"
 #include "tests/pipeline/small_run.h"
 #include "tests/pipeline/temporary_folder.h"
 #include "tests/support/shapes.h"
@@ -153,30 +152,12 @@ TEST(LabelSupports, HoldABlockAsTheSameOnesOfASurfaceDo) {
   RecordProperty("end_difference_mm", fmt::format("{:.3f}", (ours.end_mm - theirs.end_mm).norm()));
 }
 
-constexpr double scan_noise_mm = 0.2;
-
-/// The skin of a pose with noise along its normals: a scan whose truth is known.
-void write_scan_of(const std::filesystem::path& pose_file, const std::filesystem::path& scan) {
-  const meshing::PoseMesh pose = meshing::read_pose(pose_file);
-  const calibration::ModelSkin skin(pose.mesh, pose.positions);
-  reconstruction::Surface surface;
-  surface.points = skin.node_points();
-  surface.triangles = skin.triangles();
-  for (int& node : surface.triangles.reshaped())
-    node = static_cast<int>(std::lower_bound(skin.nodes().begin(), skin.nodes().end(), node) - skin.nodes().begin());
-  const Points normals = skin.node_normals();
-  std::mt19937 random(3);
-  std::normal_distribution<double> noise(0, scan_noise_mm);
-  for (Eigen::Index p = 0; p < surface.points.rows(); ++p) surface.points.row(p) += noise(random) * normals.row(p);
-  reconstruction::write_surface(surface, scan);
-}
-
 TEST(LabelSupports, AModulusIsFoundAndNothingElseIsMissing) {
   const TemporaryFolder folder;
   const std::filesystem::path block = folder / "block";
   write_label_case(block, "air = [0, 4]\nsupport.clamp = [2]\nsupport.table = [3]\n");
   ASSERT_EQ(make(block, "simulate").code, 0);
-  write_scan_of(block / "out/tilted.vtu", block / "scan.vtp");
+  write_simulated_scan(block / "out/tilted.vtu", block / "scan.vtp");
   write_text(block / "case.toml", read_text(block / "case.toml") + "surface = \"scan.vtp\"\nnoise_mm = 0.2\n");
   write_text(block / "model.toml",
              replaced(model, "young_modulus_kpa = 5",

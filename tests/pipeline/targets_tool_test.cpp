@@ -8,6 +8,7 @@
 
 #include "common/landmarks.h"
 #include "tests/pipeline/process.h"
+#include "tests/pipeline/simulated_scan.h"
 #include "tests/pipeline/small_run.h"
 #include "tests/pipeline/temporary_folder.h"
 
@@ -81,6 +82,8 @@ TEST_F(TargetsTool, WithoutAScanGoesByPriorsAndIsLessSure) {
 }
 
 TEST_F(TargetsTool, AnotherModelIsWhereTheFitBeginsWithThePriorsOfTheCase) {
+  write_simulated_scan(case_ / "out/supine.vtu", case_ / "simulated.vtp");
+  write_text(case_ / "case.toml", replaced(read_text(case_ / "case.toml"), "supine.ply", "simulated.vtp"));
   ASSERT_EQ(run(inside()).code, 0);
   const Json own = json()["points"];
   write_text(case_ / "calibrated.toml",
@@ -95,7 +98,7 @@ TEST_F(TargetsTool, AnotherModelIsWhereTheFitBeginsWithThePriorsOfTheCase) {
     const double sigma_mm = own[p]["sigma_mm"];
     for (std::size_t axis = 0; axis < 3; ++axis)
       EXPECT_NEAR(begun[p]["place_mm"][axis].get<double>(), own[p]["place_mm"][axis].get<double>(), 0.5 * sigma_mm);
-    EXPECT_NEAR(begun[p]["sigma_mm"].get<double>(), sigma_mm, 0.05 * sigma_mm);
+    EXPECT_NEAR(begun[p]["sigma_mm"].get<double>(), sigma_mm, 0.15 * sigma_mm);
   }
 }
 

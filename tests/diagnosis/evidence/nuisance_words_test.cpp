@@ -44,6 +44,14 @@ TEST(FarNuisances, AreToldWithTheirSizeAndTheFurthestComesFirst) {
   ASSERT_EQ(far.size(), 2u);
   EXPECT_EQ(far[0].in_words, "how stiff the gland is over fat: x 2 (2.3 sigma)");
   EXPECT_EQ(far[1].in_words, "which way is down in supine, head to feet: -3.2° (1.6 sigma)");
+  EXPECT_EQ(too_far_words(all), "where the supine scan lies, along x ended 5.0 sigma from where it is expected");
+}
+
+TEST(FarNuisances, NoneIsTooFarUnderFourSigma) {
+  std::vector<Nuisance> all = nuisances_of({}, {"prone", "supine"}, Priors{});
+  all.back().value = -3.9;
+  EXPECT_EQ(too_far_words(all), "");
+  EXPECT_EQ(too_far_words({}), "");
 }
 
 }  // namespace
