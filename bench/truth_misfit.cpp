@@ -79,6 +79,67 @@ VectorXd mesh_error(const diagnosis::Subject& at, const diagnosis::BaseFit& base
   return on_given_mm - there.distance_mm;
 }
 
+/// A truth beside the fit of a model that lacks nothing.
+struct Beside {
+  const diagnosis::Subject& at;
+  const diagnosis::BaseFit& base;
+  const Json& answer;
+  VectorXd u;                   // true moduli
+  VectorXd distance_mm;         // of the truth on the given mesh
+  double size_mm;               // of the discrepancy that was drawn
+  VectorXd whitened_mm;         // of the truth
+  VectorXd whitened_mesh_mm{};  // of them what the mesh does, where the truth's own is known
+
+  VectorXd white(const VectorXd& of_clusters) const { return whitened(base, of_clusters, size_mm); }
+  double misfit(const VectorXd& z) const { return z.squaredNorm() / static_cast<double>(z.size()); }
+};
+
+/// The truth's numbers on the given mesh.
+Beside truth_beside(const diagnosis::Subject& at, calibration::Evaluator& evaluator, const diagnosis::BaseFit& base,
+                    const Json& answer, bool own) {
+  Beside truth{at, base, answer, true_coordinates(*base.parameters, answer), {}, answer.at("discrepancy").at("size_mm"),
+               {}};
+  const simulation::Model model = diagnosis::with_nuisances(
+      base.parameters->model(truth.u), true_nuisances(base.nuisances, answer, own), diagnosis::poses_of(at.scene));
+  const calibration::Prediction prediction = evaluator.predict(model, &base.fit.prediction.solution);
+  const calibration::Residuals residuals =
+      calibration::residuals_of(at.scene, prediction, base.fit.mask, base.noise_mm);
+  truth.distance_mm = residuals.distance_mm;
+  truth.whitened_mm = truth.white(base.distances(residuals));
+  truth.whitened_mesh_mm = VectorXd::Zero(truth.whitened_mm.size());
+  fmt::print("points {} size_mm {:.2f} misfit {:.3f} of_fit {:.3f}\n", truth.whitened_mm.size(), truth.size_mm,
+             truth.misfit(truth.whitened_mm), truth.misfit(truth.white(base.distances(base.fit.residuals))));
+  return truth;
+}
+
+void tell_mesh(const meshing::TetMesh& mesh, Beside& truth) {
+  const diagnosis::BaseFit& base = truth.base;
+  const VectorXd before_mm = mesh_error(truth.at, base, mesh, truth.u, truth.answer, truth.distance_mm);
+  const VectorXd after_mm = base.clusters.means(before_mm + base.mean_mm);
+  truth.whitened_mesh_mm = truth.white(after_mm);
+  fmt::print("mesh {:.3f} mm, corrected {:.3f}, taken to be {:.3f} and {:.3f}; misfit {:.3f}\n", rms(before_mm),
+             rms(after_mm), rms(base.mean_mm), base.numerical->spread_mm, truth.misfit(truth.whitened_mesh_mm));
+}
+
+/// The share of the misfit along every number and every effect.
+void tell_shares(calibration::Evaluator& evaluator, const Beside& truth) {
+  const diagnosis::BaseFit& base = truth.base;
+  const auto tell = [&](const char* what, const std::string& name, const VectorXd& of_points) {
+    const VectorXd along = truth.white(base.clusters.means(of_points)).normalized();
+    fmt::print("{} {} {:.3f} {:.3f}\n", what, name, along.dot(truth.whitened_mm), along.dot(truth.whitened_mesh_mm));
+  };
+  for (Index i = 0; i < truth.u.size(); ++i)
+    tell("number", base.parameters->names()[static_cast<std::size_t>(i)], base.fit.linearisation.slope.col(i));
+  for (const Nuisance& nuisance : base.nuisances) tell("number", nuisance.name(), nuisance.shape_mm);
+  std::vector<std::string> unseen;
+  auto candidates = diagnosis::find_candidates(evaluator, base.model, base.fit, unseen);
+  diagnosis::find_secants(truth.at.scene, base, base, candidates, true);
+  for (const diagnosis::Candidate& candidate : candidates)
+    for (Index k = 0; k < candidate.slope.cols(); ++k)
+      tell("effect", candidate.parameters[static_cast<std::size_t>(k)].name,
+           candidate.secant.size() > 0 && k == 0 ? candidate.secant : VectorXd(candidate.slope.col(k)));
+}
+
 void run(const char* const* words, const std::string& truth_file) {
   const bool own = truth_file == words[2];
   pipeline::Run run("bench_truth_misfit", true, true, false, 1, nlohmann::ordered_json::object());
@@ -94,41 +155,9 @@ void run(const char* const* words, const std::string& truth_file) {
   calibration::Evaluator evaluator(at.scene, at.start, diagnosis::accurate_enough());
   const diagnosis::BaseFit base = diagnosis::fit_base_model(evaluator, at.given, at.start, at.noise_mm, at.near,
                                                             {options.priors, options.other_meshes, {}});
-  const std::vector<Nuisance> nuisances = true_nuisances(base.nuisances, answer, own);
-  const VectorXd u = true_coordinates(*base.parameters, answer);
-  const simulation::Model truth =
-      diagnosis::with_nuisances(base.parameters->model(u), nuisances, diagnosis::poses_of(at.scene));
-  const calibration::Prediction prediction = evaluator.predict(truth, &base.fit.prediction.solution);
-  const calibration::Residuals residuals =
-      calibration::residuals_of(at.scene, prediction, base.fit.mask, base.noise_mm);
-  const double size_mm = answer.at("discrepancy").at("size_mm");
-  const VectorXd z = whitened(base, base.distances(residuals), size_mm);
-  const VectorXd fitted = whitened(base, base.distances(base.fit.residuals), size_mm);
-  fmt::print("points {} size_mm {:.2f} misfit {:.3f} of_fit {:.3f}\n", z.size(), size_mm,
-             z.squaredNorm() / static_cast<double>(z.size()), fitted.squaredNorm() / static_cast<double>(z.size()));
-  VectorXd of_mesh = VectorXd::Zero(z.size());
-  if (!truth_file.empty() && !own) {
-    const VectorXd before_mm = mesh_error(at, base, meshing::read_mesh(truth_file), u, answer, residuals.distance_mm);
-    const VectorXd after_mm = base.clusters.means(before_mm + base.mean_mm);
-    of_mesh = whitened(base, after_mm, size_mm);
-    fmt::print("mesh {:.3f} mm, corrected {:.3f}, taken to be {:.3f} and {:.3f}; misfit {:.3f}\n", rms(before_mm),
-               rms(after_mm), rms(base.mean_mm), base.numerical->spread_mm,
-               of_mesh.squaredNorm() / static_cast<double>(z.size()));
-  }
-  const auto tell = [&](const char* what, const std::string& name, const VectorXd& of_points) {
-    const VectorXd along = whitened(base, base.clusters.means(of_points), size_mm).normalized();
-    fmt::print("{} {} {:.3f} {:.3f}\n", what, name, along.dot(z), along.dot(of_mesh));
-  };
-  for (Index i = 0; i < u.size(); ++i)
-    tell("number", base.parameters->names()[static_cast<std::size_t>(i)], base.fit.linearisation.slope.col(i));
-  for (const Nuisance& nuisance : base.nuisances) tell("number", nuisance.name(), nuisance.shape_mm);
-  std::vector<std::string> unseen;
-  auto candidates = diagnosis::find_candidates(evaluator, base.model, base.fit, unseen);
-  diagnosis::find_secants(at.scene, base, base, candidates, true);
-  for (const diagnosis::Candidate& candidate : candidates)
-    for (Index k = 0; k < candidate.slope.cols(); ++k)
-      tell("effect", candidate.parameters[static_cast<std::size_t>(k)].name,
-           candidate.secant.size() > 0 && k == 0 ? candidate.secant : VectorXd(candidate.slope.col(k)));
+  Beside truth = truth_beside(at, evaluator, base, answer, own);
+  if (!truth_file.empty() && !own) tell_mesh(meshing::read_mesh(truth_file), truth);
+  tell_shares(evaluator, truth);
 }
 
 }  // namespace

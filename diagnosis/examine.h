@@ -62,6 +62,7 @@ struct Findings {
     double left_out_gain = 0;  ///< of the surest, as it was
   };
   std::vector<Beside> beside;               ///< each holds those before it
+  std::vector<Beside> dropped;              ///< that held an effect which does nothing
   std::vector<Refit> refits;                ///< of some of them, the likelier first
   std::vector<Inclusion> included;          ///< most probable first
   Unlisted unlisted;                        ///< causes that no effect lists, as rivals

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "common/error.h"
 #include "diagnosis/beside.h"
@@ -47,11 +48,11 @@ class Follower {
       explore();
       settle_strengths();
     }
-    for (std::vector<int> part = surest_part(found_); options_.refits > 0 && !part.empty();
-         part = surest_part(found_)) {
-      if (!look_again_beside(part)) break;
-      settle_strengths();
-    }
+    if (options_.refits == 0) return;
+    look_beside();
+    if (!do_without_idle()) return;
+    settle_strengths();
+    look_beside();
   }
 
  private:
@@ -304,15 +305,19 @@ class Follower {
     }
   }
 
+  std::vector<Refit>::iterator refit_of(const std::vector<int>& effects) const {
+    return std::find_if(found_.refits.begin(), found_.refits.end(),
+                        [&effects](const Refit& r) { return r.solved && r.hypothesis.effects == effects; });
+  }
+
   /// The refit of a set, followed now where it was not; the number of refits where there is none.
   std::size_t refit_with(const std::vector<int>& effects) {
-    const auto is_it = [&effects](const Refit& r) { return r.solved && r.hypothesis.effects == effects; };
-    auto at = std::find_if(found_.refits.begin(), found_.refits.end(), is_it);
+    auto at = refit_of(effects);
     const auto known = std::find_if(found_.hypotheses.begin(), found_.hypotheses.end(),
                                     [&effects](const Hypothesis& h) { return h.effects == effects; });
     if (at == found_.refits.end() && known != found_.hypotheses.end()) {
       follow_one(effects);
-      at = std::find_if(found_.refits.begin(), found_.refits.end(), is_it);
+      at = refit_of(effects);
     }
     return static_cast<std::size_t>(at - found_.refits.begin());
   }
@@ -365,6 +370,72 @@ class Follower {
     draw_from(at);
     for (std::size_t further = 0; further < most_on_from_first; ++further)
       if (!one_step_on_from_first()) break;
+    return true;
+  }
+
+  void look_beside() {
+    for (std::vector<int> part = surest_part(found_); !part.empty(); part = surest_part(found_)) {
+      if (!look_again_beside(part)) break;
+      settle_strengths();
+    }
+  }
+
+  /// An effect of the likeliest set that errors were measured beside and that does nothing there, or -1.
+  int idle_effect() const {
+    const Hypothesis& first = found_.hypotheses.front();
+    if (found_.beside.empty() || first.effects.size() < 2) return -1;
+    const auto refit = refit_of(first.effects);
+    if (refit == found_.refits.end()) return -1;
+    for (const int e : found_.beside.back().effects)
+      if (does_nothing(*refit, found_.candidates[static_cast<std::size_t>(e)])) return e;
+    return -1;
+  }
+
+  /// Errors that were measured beside an effect count no more; what was weighed under them is weighed under those that
+  /// are left.
+  void drop_errors_beside(int effect) {
+    const auto holds = [effect](const Findings::Beside& beside) { return is_part_of({effect}, beside.effects); };
+    const auto from = std::find_if(found_.beside.begin(), found_.beside.end(), holds);
+    std::move(from, found_.beside.end(), std::back_inserter(found_.dropped));
+    found_.beside.erase(from, found_.beside.end());
+    for (Refit& refit : found_.refits) {
+      const std::vector<int> effects = refit.hypothesis.effects;
+      const BaseFit& ground = ground_of(effects);
+      if (!refit.solved || refit.hypothesis.ground == &ground) continue;
+      refit = refit_again(subject_.scene, ground, refit);
+      if (refit.solved) hypothesis_of(found_, effects) = refit.hypothesis;
+    }
+    std::erase_if(found_.hypotheses, [this](const Hypothesis& h) { return h.ground != &ground_of(h.effects); });
+    std::erase_if(drawn_, [&](std::size_t at) { return is_part_of({effect}, found_.refits[at].hypothesis.effects); });
+  }
+
+  /// A part of a set is followed from where the whole ended; of two fits of it the likelier is kept.
+  void follow_within(const std::vector<int>& whole, const std::vector<int>& part) {
+    const auto h = std::find_if(found_.hypotheses.begin(), found_.hypotheses.end(),
+                                [&part](const Hypothesis& one) { return one.effects == part; });
+    const auto from = refit_of(whole), before = refit_of(part);
+    if (from == found_.refits.end() || h == found_.hypotheses.end()) return;
+    tell("without what does nothing, refit with", part);
+    Refit refit = refit_within(subject_.scene, subject_.given, ground_of(part), *from, found_.candidates, *h);
+    const bool first = before == found_.refits.end();
+    if (!refit.solved || (!first && refit.hypothesis.ln_evidence <= h->ln_evidence)) return;
+    *h = refit.hypothesis;
+    if (first)
+      found_.refits.push_back(std::move(refit));
+    else
+      *before = std::move(refit);
+  }
+
+  /// The likeliest set is followed without an effect of it that does nothing. @return  whether there was one
+  bool do_without_idle() {
+    const int idle = idle_effect();
+    if (idle < 0) return false;
+    const std::vector<int> whole = found_.hypotheses.front().effects;
+    drop_errors_beside(idle);
+    std::vector<int> part = whole;
+    std::erase(part, idle);
+    follow_within(whole, part);
+    weigh();
     return true;
   }
 

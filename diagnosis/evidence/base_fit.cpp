@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numeric>
 #include <optional>
 
 #include "calibration/noise.h"
@@ -138,17 +137,6 @@ void add_up_errors(Evaluator& evaluator, const Priors& priors, BaseFit& base) {
   base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);
 }
 
-LinearEvidence evidence_at(const BaseFit& base) {
-  return {*base.covariance, base.distances(base.fit.residuals),
-          directions_at(base.fit, *base.parameters, base.nuisances, base.clusters)};
-}
-
-Weighed with_all(const LinearEvidence& evidence) {
-  std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
-  std::iota(all.begin(), all.end(), 0);
-  return evidence.weigh(all);
-}
-
 /// Errors of body and mesh where @p base is.
 /// @param meshes  the mesh's errors of a similar model, or at least its other meshes; nullptr = of no model yet
 void find_errors(Evaluator& evaluator, JointFitter& fitter, const Priors& priors, bool other_meshes,
@@ -222,9 +210,14 @@ Directions directions_at(const calibration::Fit& fit, const FreeParameters& para
   return all;
 }
 
+LinearEvidence evidence_of(const BaseFit& ground, const JointFit& at) {
+  return {*ground.covariance, ground.distances(at.fit.residuals),
+          directions_at(at.fit, *at.parameters, at.nuisances, ground.clusters)};
+}
+
 JointPosterior posterior_of(const BaseFit& base) {
-  const LinearEvidence evidence = evidence_at(base);
-  const Weighed weighed = with_all(evidence);
+  const LinearEvidence evidence = evidence_of(base, base);
+  const Weighed weighed = evidence.weigh_all();
   const Directions& all = evidence.directions();
   const Index moduli = base.fit.u.size();
   JointPosterior result{all.names, VectorXd(all.size()), VectorXd(all.size()), MatrixXd::Zero(moduli, moduli)};
@@ -249,9 +242,7 @@ VectorXd BaseFit::distances(const Residuals& residuals) const {
 }
 
 double BaseFit::size_of(const Weighed& weighed) const {
-  Index likeliest;
-  weighed.size_probability.maxCoeff(&likeliest);
-  return covariance->sizes_mm()[likeliest];
+  return covariance->sizes_mm()[static_cast<Index>(weighed.likeliest())];
 }
 
 BaseFit fit_base_model(Evaluator& evaluator, const simulation::Model& given, const simulation::Model& start,

@@ -57,6 +57,9 @@ JointPosterior posterior_of(const BaseFit& base);
 Directions directions_at(const calibration::Fit& fit, const calibration::FreeParameters& parameters,
                          const std::vector<Nuisance>& nuisances, const calibration::Clusters& clusters);
 
+/// Evidence of the numbers of a fit under the errors of @p ground.
+LinearEvidence evidence_of(const BaseFit& ground, const JointFit& at);
+
 struct BaseFitOptions {
   Priors priors;
   bool other_meshes = true;                          ///< measure the mesh's error

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <set>
 
 #include "calibration/work_limit.h"
@@ -61,12 +60,6 @@ std::vector<int> add_candidate(const BaseFit& base, const JointFit& at, const Ca
 std::vector<int> exchanged(std::vector<int> rows, const std::vector<int>& replaced, const std::vector<int>& own) {
   std::erase_if(rows, [&](int row) { return std::find(replaced.begin(), replaced.end(), row) != replaced.end(); });
   rows.insert(rows.end(), own.begin(), own.end());
-  return rows;
-}
-
-std::vector<int> first_rows(Eigen::Index count) {
-  std::vector<int> rows(static_cast<std::size_t>(count));
-  std::iota(rows.begin(), rows.end(), 0);
   return rows;
 }
 

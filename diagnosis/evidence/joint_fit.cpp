@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "calibration/work_limit.h"
 #include "common/error.h"
@@ -135,16 +134,11 @@ std::unique_ptr<simulation::Sensitivities> JointFitter::linearise() {
 }
 
 bool JointFitter::improve() {
-  const VectorXd y = ground_.distances(fit_.fit.residuals);
-  const LinearEvidence evidence(*ground_.covariance, y,
-                                directions_at(fit_.fit, *fit_.parameters, fit_.nuisances, ground_.clusters));
-  std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
-  std::iota(all.begin(), all.end(), 0);
-  const Weighed weighed = evidence.weigh(all);
-  Index likeliest;
-  weighed.size_probability.maxCoeff(&likeliest);
+  const LinearEvidence evidence = evidence_of(ground_, fit_);
+  const VectorXd& y = evidence.distances();
+  const Weighed weighed = evidence.weigh_all();
   fit_.size_mm = ground_.size_of(weighed);
-  VectorXd step = weighed.mean[static_cast<std::size_t>(likeliest)];
+  VectorXd step = weighed.mean[weighed.likeliest()];
   const double longest = step.head(fit_.fit.u.size()).cwiseAbs().maxCoeff();
   if (longest > longest_step) step *= longest_step / longest;
   const JointTrial now{fit_.fit.u, fit_.nuisances};

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "common/error.h"
 #include "common/log_sum.h"
@@ -86,8 +87,20 @@ std::pair<double, double> Weighed::sum(const Eigen::VectorXd& weights) const {
   return {first, std::sqrt(std::max(0.0, second - first * first))};
 }
 
+std::size_t Weighed::likeliest() const {
+  Eigen::Index bin;
+  size_probability.maxCoeff(&bin);
+  return static_cast<std::size_t>(bin);
+}
+
 std::pair<double, double> Weighed::number(Eigen::Index k) const {
   return sum(Eigen::VectorXd::Unit(mean.front().size(), k));
+}
+
+std::vector<int> first_rows(Eigen::Index count) {
+  std::vector<int> rows(static_cast<std::size_t>(count));
+  std::iota(rows.begin(), rows.end(), 0);
+  return rows;
 }
 
 LinearEvidence::LinearEvidence(const ErrorCovariance& errors, const Eigen::VectorXd& y, Directions all)

@@ -61,6 +61,9 @@ struct Directions {
   void cut_below(double value);
 };
 
+/// 0, 1, … up to @p count.
+std::vector<int> first_rows(Eigen::Index count);
+
 /// A hypothesis weighed: distances y = −C θ + errors, all normal.
 struct Weighed {
   double ln_evidence = 0;                   ///< over s, up to what is the same for all of as many distances
@@ -72,6 +75,8 @@ struct Weighed {
   std::pair<double, double> sum(const Eigen::VectorXd& weights) const;
   /// Of number k.
   std::pair<double, double> number(Eigen::Index k) const;
+  /// The likeliest bin of s.
+  std::size_t likeliest() const;
 };
 
 /// Evidence of subsets of directions for one measurement (linear-Gaussian, so exact; Laplace's formula otherwise):
@@ -83,6 +88,7 @@ class LinearEvidence {
 
   /// @param which  rows of the directions
   Weighed weigh(const std::vector<int>& which) const;
+  Weighed weigh_all() const { return weigh(first_rows(all_.size())); }
   /// A draw from the posterior of what neither the numbers nor the errors explain, mm, #n.
   Eigen::VectorXd draw_discrepancy(const std::vector<int>& which, const Weighed& weighed,
                                    std::mt19937_64& generator) const;

@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <functional>
-#include <numeric>
 #include <random>
 #include <vector>
 
@@ -26,14 +25,8 @@ constexpr unsigned seed = 1;
 
 /// Offsets from the fit, each with that of the opposite sign: two draws and their mirror images.
 std::vector<VectorXd> draw_offsets(const BaseFit& base) {
-  const LinearEvidence evidence(*base.covariance, base.distances(base.fit.residuals),
-                                directions_at(base.fit, *base.parameters, base.nuisances, base.clusters));
-  std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
-  std::iota(all.begin(), all.end(), 0);
-  const Weighed weighed = evidence.weigh(all);
-  Index likeliest;
-  weighed.size_probability.maxCoeff(&likeliest);
-  const auto bin = static_cast<std::size_t>(likeliest);
+  const Weighed weighed = evidence_of(base, base).weigh_all();
+  const std::size_t bin = weighed.likeliest();
   const MatrixXd root = weighed.covariance[bin].llt().matrixL();
   std::mt19937_64 generator(seed);
   std::normal_distribution<double> normal;

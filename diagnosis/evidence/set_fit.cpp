@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "calibration/work_limit.h"
 #include "common/error.h"
@@ -70,10 +69,8 @@ JointFit unfitted(const simulation::Model& given, const BaseFit& base, const Joi
 void weigh_at(const BaseFit& base, const JointFit& fit, Hypothesis& h) {
   h.refitted = true;
   h.ground = &base;
-  h.evidence = std::make_shared<LinearEvidence>(*base.covariance, base.distances(fit.fit.residuals),
-                                                directions_at(fit.fit, *fit.parameters, fit.nuisances, base.clusters));
-  h.rows.resize(static_cast<std::size_t>(h.evidence->directions().size()));
-  std::iota(h.rows.begin(), h.rows.end(), 0);
+  h.evidence = std::make_shared<LinearEvidence>(evidence_of(base, fit));
+  h.rows = first_rows(h.evidence->directions().size());
   h.weighed = h.evidence->weigh(h.rows);
   h.ln_evidence = h.weighed.ln_evidence;
 }

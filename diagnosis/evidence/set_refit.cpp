@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 #include "common/error.h"
 #include "common/rms.h"
@@ -107,10 +106,7 @@ std::vector<FittedParameter> parameters_of(const Refit& refit, const FreeParamet
 /// Distances of the points with all numbers where the likeliest size of the discrepancy has them, to first order: the
 /// chain was solved with nuisances where the base fit has them.
 VectorXd distances_at_posterior(const BaseFit& base, const Hypothesis& h, const calibration::Residuals& residuals) {
-  Index likeliest;
-  h.weighed.size_probability.maxCoeff(&likeliest);
-  const VectorXd change =
-      h.evidence->directions().columns(Eigen::all, h.rows) * h.weighed.mean[static_cast<std::size_t>(likeliest)];
+  const VectorXd change = h.evidence->directions().columns(Eigen::all, h.rows) * h.weighed.mean[h.weighed.likeliest()];
   VectorXd distance = residuals.distance_mm;
   for (Index r = 0; r < distance.size(); ++r) distance[r] += change[base.clusters.of_point[r]];
   return distance;
@@ -164,9 +160,7 @@ void fit_set(const calibration::MeasuredScene& scene, const BaseFit& base, const
   joint.fit = std::move(fit.solution);
   joint.model = there.model(joint.fit.u);
   weigh_at(base, joint, h);
-  Index likeliest;
-  h.weighed.size_probability.maxCoeff(&likeliest);
-  const VectorXd& mean = h.weighed.mean[static_cast<std::size_t>(likeliest)];
+  const VectorXd& mean = h.weighed.mean[h.weighed.likeliest()];
   const Index nuisances = mean.size() - joint.fit.u.size();
   if (nuisances == 0 || mean.tail(nuisances).cwiseAbs().maxCoeff() < far) return;
   JointFitter fitter(evaluator, joint, base);
@@ -232,6 +226,12 @@ bool find_fit(const calibration::MeasuredScene& scene, const BaseFit& base, cons
   return result.solved;
 }
 
+std::vector<std::string> names_of(const Hypothesis& h, const std::vector<Candidate>& candidates) {
+  std::vector<std::string> names;
+  for (const int effect : h.effects) names.push_back(candidates[static_cast<std::size_t>(effect)].effect);
+  return names;
+}
+
 /// Fills what a fit says of its set, by Laplace.
 void tell_of(const BaseFit& base, Refit& result) {
   const JointFit& joint = result.joint;
@@ -248,8 +248,7 @@ void tell_of(const BaseFit& base, Refit& result) {
 Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& base,
             const JointFit& from, const std::vector<Candidate>& candidates, const Hypothesis& screened) {
   Refit result;
-  for (const int effect : screened.effects)
-    result.effects.push_back(candidates[static_cast<std::size_t>(effect)].effect);
+  result.effects = names_of(screened, candidates);
   result.joint = unfitted(given, base, from, result.effects);
   result.joint.size_mm = base.size_of(screened.weighed);
   if (find_fit(scene, base, from, candidates, screened, result)) tell_of(base, result);
@@ -271,6 +270,39 @@ Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground
   result.hypothesis.screened = result.hypothesis.ln_evidence;
   tell_of(ground, result);
   return result;
+}
+
+Refit refit_within(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& ground,
+                   const Refit& whole, const std::vector<Candidate>& candidates, const Hypothesis& part) {
+  Refit result;
+  result.effects = names_of(part, candidates);
+  JointFit& joint = result.joint = unfitted(given, ground, whole.joint, result.effects);
+  // Effects that are left out may have replaced what is never known.
+  for (const Nuisance& nuisance : unfitted(given, ground, ground, result.effects).nuisances)
+    if (std::none_of(joint.nuisances.begin(), joint.nuisances.end(),
+                     [&nuisance](const Nuisance& has) { return has.name() == nuisance.name(); }))
+      joint.nuisances.push_back(nuisance);
+  joint.size_mm = ground.size_of(whole.hypothesis.weighed);
+  result.hypothesis = part;
+  try {
+    const VectorXd start = start_of(*joint.parameters, whole.joint, candidates, part);
+    fit_set(scene, ground, start, &whole.joint.fit.prediction.solution, joint, result.hypothesis);
+    result.solved = true;
+  } catch (const NumericalFailure&) {
+    return result;  // it cannot do without them
+  }
+  result.hypothesis.again = true;
+  result.hypothesis.screened = result.hypothesis.ln_evidence;
+  tell_of(ground, result);
+  return result;
+}
+
+bool does_nothing(const Refit& refit, const Candidate& candidate) {
+  return std::all_of(candidate.parameters.begin(), candidate.parameters.end(), [&refit](const CandidateParameter& p) {
+    const auto fitted = std::find_if(refit.parameters.begin(), refit.parameters.end(),
+                                     [&p](const FittedParameter& f) { return f.name == p.name; });
+    return fitted != refit.parameters.end() && fitted->low < p.null && p.null < fitted->high;
+  });
 }
 
 double find_strength_densities(const calibration::MeasuredScene& scene, const std::vector<Candidate>& candidates,

@@ -54,6 +54,16 @@ Refit refit(const calibration::MeasuredScene& scene, const simulation::Model& gi
 /// Follows a set once more from where it was followed before, under the errors of @p ground.
 Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground, const Refit& before);
 
+/// Follows a part of a set from where the whole ended: what the whole has found may do without the effects that the
+/// part lacks.
+/// @param ground  whose errors count
+/// @param part    its hypothesis, of which the effects count
+Refit refit_within(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& ground,
+                   const Refit& whole, const std::vector<Candidate>& candidates, const Hypothesis& part);
+
+/// Whether every strength of an effect may as well be what it is where the effect is not there, by its 95 % interval.
+bool does_nothing(const Refit& refit, const Candidate& candidate);
+
 /// Where an effect of the refit is far from linear in its strength: the density of it, which its interval and the
 /// evidence are taken from then (strength_profile.h). Many chain solves: for what is likely; once.
 /// @return  what the logarithm of the evidence gains

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "common/error.h"
 #include "common/first_failure.h"
@@ -52,11 +51,7 @@ double ln_normal(double u, const calibration::Prior& prior) {
 }
 
 /// The likeliest offsets of the first @p count numbers.
-VectorXd likeliest(const Weighed& weighed, Index count) {
-  Index size;
-  weighed.size_probability.maxCoeff(&size);
-  return weighed.mean[static_cast<std::size_t>(size)].head(count);
-}
+VectorXd likeliest(const Weighed& weighed, Index count) { return weighed.mean[weighed.likeliest()].head(count); }
 
 class Walker {
  public:
@@ -144,9 +139,7 @@ class Walker {
     descend(evaluator, rest, ground_.metric, {.max_iterations = 2, .settled = 0.5}, fit);
     const LinearEvidence evidence(*ground_.base.covariance, ground_.base.distances(fit.solution.residuals),
                                   directions_at(fit.solution, rest, ground_.nuisances, ground_.base.clusters));
-    std::vector<int> all(static_cast<std::size_t>(evidence.directions().size()));
-    std::iota(all.begin(), all.end(), 0);
-    const Weighed weighed = evidence.weigh(all);
+    const Weighed weighed = evidence.weigh_all();
     const VectorXd there = fit.solution.u + likeliest(weighed, others.size());
     return {u, weighed.ln_evidence + ln_normal(u, prior_), there, std::move(fit.solution)};
   }

@@ -11,6 +11,7 @@
 
 #include "common/error.h"
 #include "common/statistics.h"
+#include "diagnosis/evidence/linear_evidence.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -30,12 +31,6 @@ Eigen::LLT<MatrixXd> factorised(const MatrixXd& covariance) {
   if (factor.info() != Eigen::Success)
     throw NumericalFailure("the covariance of the measured distances is not positive; are two measurements the same?");
   return factor;
-}
-
-std::vector<int> every_direction(const JointMoves& m) {
-  std::vector<int> rows(static_cast<std::size_t>(m.sd.size()));
-  std::iota(rows.begin(), rows.end(), 0);
-  return rows;
 }
 
 /// θ of one set and t, after the measurement.
@@ -207,7 +202,7 @@ ConditionedTargets condition(const JointMoves& m) {
 MatrixXd covariance_after(const JointMoves& m, double size_mm) {
   JointMoves uncut = m;
   uncut.least.resize(0);
-  return AtSize(uncut, size_mm).of(every_direction(uncut)).of_targets;
+  return AtSize(uncut, size_mm).of(first_rows(uncut.sd.size())).of_targets;
 }
 
 namespace {

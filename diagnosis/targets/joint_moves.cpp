@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "diagnosis/evidence/field_modes.h"
 
@@ -143,10 +142,7 @@ MeasuredPart measured_part(calibration::Evaluator& evaluator, const BaseFit& bas
   for (const Hypothesis& h : missing.hypotheses)
     joint.sets.push_back({placed.rows(h.rows), h.probability * h.weighed.size_probability});
   if (screened) return part;
-  std::vector<int> every(static_cast<std::size_t>(all.size()));
-  std::iota(every.begin(), every.end(), 0);
-  const LinearEvidence evidence(*base.covariance, joint.y, all);
-  joint.sets.push_back({placed.rows(every), evidence.weigh(every).size_probability});
+  joint.sets.push_back({placed.rows(first_rows(all.size())), evidence_of(base, base).weigh_all().size_probability});
   return part;
 }
 

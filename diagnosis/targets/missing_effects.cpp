@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 #include "common/error.h"
 #include "common/first_failure.h"
@@ -125,8 +124,7 @@ BelievedEffects believed_effects(const simulation::Model& model, const meshing::
   }
   const auto add = [&](const std::vector<int>& set) {
     DirectionSet directions;
-    directions.rows.resize(static_cast<std::size_t>(before));
-    std::iota(directions.rows.begin(), directions.rows.end(), 0);
+    directions.rows = first_rows(static_cast<Eigen::Index>(before));
     LikelySet likely{{}, std::exp(priors.ln_of_set(names, set))};
     for (const int effect : set) {
       const auto e = static_cast<std::size_t>(effect);

@@ -272,6 +272,47 @@ TEST(TwinDiagnosis, LinesFromItsUsualSizeShowMoreOfALigamentThanLinesFromNothing
   EXPECT_EQ(find_strength_densities(subject.scene, found->candidates, followed), 0) << "once is enough";
 }
 
+TEST(Refit, AnEffectDoesNothingWhereAllItsStrengthsMayBeWhatTheyAreWithoutIt) {
+  Candidate tilt;
+  for (const char* name : {"gravity_tilt.roll_rad", "gravity_tilt.pitch_rad"})
+    tilt.parameters.emplace_back().name = name, tilt.parameters.back().null = 0;
+  Refit refit;
+  refit.parameters = {{"gravity_tilt.roll_rad", "rad", 0.01, -0.02, 0.04},
+                      {"breast.young_modulus_kpa", "kPa", 1, 0.5, 2}};
+  EXPECT_FALSE(does_nothing(refit, tilt)) << "one of its numbers was not fitted";
+  refit.parameters.push_back({"gravity_tilt.pitch_rad", "rad", -0.01, -0.03, 0.01});
+  EXPECT_TRUE(does_nothing(refit, tilt));
+  refit.parameters.back().high = -0.001;
+  EXPECT_FALSE(does_nothing(refit, tilt));
+}
+
+TEST(TwinDiagnosis, APartOfASetIsFoundFromWhereTheWholeEnded) {
+  const Twin twin({with("chest_wall_motion", "amplitude_mm", 6), noise_mm});
+  const Subject subject = subject_of(twin);
+  const auto found = findings_of(subject, 0);
+  const auto effects = found->effects();
+  const auto place = [&effects](const char* name) {
+    return static_cast<int>(std::find(effects.begin(), effects.end(), name) - effects.begin());
+  };
+  const int hill = place("chest_wall_motion"), idle = place("gravity_tilt");
+  const auto set = [&](std::vector<int> which) {
+    std::sort(which.begin(), which.end());
+    return *std::find_if(found->hypotheses.begin(), found->hypotheses.end(),
+                         [&which](const Hypothesis& h) { return h.effects == which; });
+  };
+  const Refit whole =
+      refit(subject.scene, subject.given, found->base, found->base, found->candidates, set({hill, idle}));
+  ASSERT_TRUE(whole.solved);
+  EXPECT_FALSE(does_nothing(whole, found->candidates[static_cast<std::size_t>(hill)]));
+  const Refit alone = refit(subject.scene, subject.given, found->base, found->base, found->candidates, set({hill}));
+  const Refit within = refit_within(subject.scene, subject.given, found->base, whole, found->candidates, set({hill}));
+  ASSERT_TRUE(within.solved);
+  EXPECT_EQ(within.effects, std::vector<std::string>{"chest_wall_motion"});
+  EXPECT_EQ(within.joint.nuisances.size(), alone.joint.nuisances.size()) << "what the idle effect had replaced is back";
+  EXPECT_NEAR(within.hypothesis.ln_evidence, alone.hypothesis.ln_evidence, 1);
+  EXPECT_NEAR(within.parameters.at(0).value, alone.parameters.at(0).value, 0.5);
+}
+
 TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
   simulation::Model truth = with("chest_wall_motion", "amplitude_mm", 6);
   truth.effects[0].parameters.at("centre_lateral").value = 0.35;
