@@ -380,13 +380,13 @@ class Follower {
     }
   }
 
-  /// An effect of the likeliest set that errors were measured beside and that does nothing there, or -1.
+  /// An effect of the likeliest set that does nothing there, or -1.
   int idle_effect() const {
     const Hypothesis& first = found_.hypotheses.front();
-    if (found_.beside.empty() || first.effects.size() < 2) return -1;
+    if (first.effects.size() < 2) return -1;
     const auto refit = refit_of(first.effects);
     if (refit == found_.refits.end()) return -1;
-    for (const int e : found_.beside.back().effects)
+    for (const int e : first.effects)
       if (does_nothing(*refit, found_.candidates[static_cast<std::size_t>(e)])) return e;
     return -1;
   }

@@ -18,9 +18,9 @@ namespace supine::diagnosis {
 /// tied breast shows that an untied one does not must not count for a second effect. With two that are sure again, for
 /// a third.
 ///
-/// What was sure by itself may have stood for something that was found beside it since: then its strength ends where it
-/// does nothing, yet no set without it was ever fitted as well. Its set is followed without it from where the whole
-/// ended, and all is weighed under errors that were not measured beside it.
+/// An effect may have stood for something that was found beside it since: then its strength ends where it does nothing,
+/// yet no set without it was ever fitted as well. Its set is followed without it from where the whole ended, and all is
+/// weighed under errors that were not measured beside it.
 void follow(const Subject& subject, const ExamineOptions& options, Findings& found);
 
 }  // namespace supine::diagnosis
