@@ -20,8 +20,9 @@ void write_simulated_scan(const std::filesystem::path& pose_file, const std::fil
   for (int& node : surface.triangles.reshaped())
     node = static_cast<int>(std::lower_bound(skin.nodes().begin(), skin.nodes().end(), node) - skin.nodes().begin());
   const Points normals = skin.node_normals();
+  constexpr double noise_mm = 0.2;
   std::mt19937 random(3);
-  std::normal_distribution<double> noise(0, simulated_noise_mm);
+  std::normal_distribution<double> noise(0, noise_mm);
   for (Eigen::Index p = 0; p < surface.points.rows(); ++p)
     surface.points.row(p) += noise(random) * normals.row(p) + shift_mm;
   reconstruction::write_surface(surface, scan);

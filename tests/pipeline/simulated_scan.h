@@ -6,9 +6,7 @@
 
 namespace supine::pipeline {
 
-inline constexpr double simulated_noise_mm = 0.2;
-
-/// Writes the skin of a pose with noise along its normals: a scan of a body that lacks nothing.
+/// Writes the skin of a pose with noise of 0.2 mm along its normals: a scan of a body that lacks nothing.
 /// @param shift_mm  by which it lies elsewhere
 void write_simulated_scan(const std::filesystem::path& pose_file, const std::filesystem::path& scan,
                           const Eigen::RowVector3d& shift_mm = Eigen::RowVector3d::Zero());
