@@ -6,7 +6,8 @@
 namespace supine::diagnosis {
 
 /// Follows the likeliest sets of effects through the chain, and what is simpler than the one that comes out first;
-/// fills refits, and the probabilities of the hypotheses anew.
+/// fills refits, and the probabilities of the hypotheses anew. A scan that lies far off is put in its place before
+/// anything else: from where it is not, lines show what is not there.
 ///
 /// Where a refit ends far from what the lines of the base fit promise, as bends do that are as long as the body, sets
 /// are found one effect at a time instead: every effect is followed by itself, and lines are drawn again from the

@@ -74,15 +74,20 @@ std::vector<Nuisance> with_those_of(const simulation::Model& model, std::vector<
   return known;
 }
 
-void fill_targets(const PointMoves& moves, const MatrixXd& effects, const Points& places, JointMoves& joint) {
+void fill_targets(const PointMoves& moves, const MatrixXd& effects, JointMoves& joint) {
   joint.targets.resize(moves.parameters.rows(), moves.parameters.cols() + moves.nuisances.cols() + effects.cols());
   joint.targets << moves.parameters, moves.nuisances, effects;
   joint.target_patches = moves.patches;
-  joint.target_kernel = moves.forces * moves.forces.transpose() + beyond_forces(places);
 }
 
-void fill_cross(const BaseFit& base, const Discrepancy& discrepancy, const MatrixXd& forces, const Points& places,
-                int pose, JointMoves& joint) {
+MatrixXd target_kernel(const MatrixXd& forces, const Points& places) {
+  return forces * forces.transpose() + beyond_forces(places);
+}
+
+void fill_kernels(const BaseFit& base, const Discrepancy& discrepancy, const MatrixXd& forces, const Points& places,
+                  int pose, JointMoves& joint) {
+  joint.data_kernel = discrepancy.kernel;
+  joint.target_kernel = target_kernel(forces, places);
   MatrixXd columns = discrepancy.columns;
   for (Index i = 0; i < columns.rows(); ++i)
     if (base.clusters.pose[i] != pose) columns.row(i) *= common_to_poses;
@@ -137,7 +142,6 @@ MeasuredPart measured_part(calibration::Evaluator& evaluator, const BaseFit& bas
   // The fit took both where it began; distances and targets must be moved by the same ones.
   joint.data_errors =
       base.errors - base.patches * base.patches.transpose() + joint.data_patches * joint.data_patches.transpose();
-  joint.data_kernel = part.discrepancy.kernel;
   joint.sizes_mm = base.covariance->sizes_mm();
   for (const Hypothesis& h : missing.hypotheses)
     joint.sets.push_back({placed.rows(h.rows), h.probability * h.weighed.size_probability});

@@ -32,14 +32,18 @@ MeasuredPart measured_part(calibration::Evaluator& evaluator, const BaseFit& bas
 JointMoves believed_part(const calibration::FreeParameters& free, const std::vector<Nuisance>& nuisances,
                          const BelievedEffects& believed, const Priors& priors, double way_mm);
 
-/// Fills what is of targets but their errors and what they share with the distances.
-void fill_targets(const PointMoves& moves, const Eigen::MatrixXd& effects, const Points& places, JointMoves& joint);
+/// Fills what is of targets but their errors and what unknown forces do.
+void fill_targets(const PointMoves& moves, const Eigen::MatrixXd& effects, JointMoves& joint);
 
-/// Fills what targets share with the distances through forces that no effect stands for.
+/// Covariance of targets through forces that no effect stands for, of a size of 1 mm.
+/// @param forces  what each moves the targets by, #t by #f
+Eigen::MatrixXd target_kernel(const Eigen::MatrixXd& forces, const Points& places);
+
+/// Fills what forces that no effect stands for make of distances and targets together, of a size of 1 mm.
 /// @param forces  what each moves the targets by, #t by #f
 /// @param pose    of the targets, among the measured ones; -1: none of them
-void fill_cross(const BaseFit& base, const Discrepancy& discrepancy, const Eigen::MatrixXd& forces,
-                const Points& places, int pose, JointMoves& joint);
+void fill_kernels(const BaseFit& base, const Discrepancy& discrepancy, const Eigen::MatrixXd& forces,
+                  const Points& places, int pose, JointMoves& joint);
 
 /// Errors of the mesh: alike for places close to each other, #t by #t.
 Eigen::MatrixXd mesh_errors(const Points& places, double sd_mm, double length_mm);

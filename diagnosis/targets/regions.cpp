@@ -9,10 +9,12 @@
 
 #include "calibration/model_skin.h"
 #include "common/error.h"
+#include "diagnosis/evidence/mean_kernel.h"
 #include "diagnosis/evidence/nuisance_words.h"
 #include "diagnosis/further_poses.h"
 #include "diagnosis/targets/further_scan.h"
 #include "diagnosis/targets/joint_moves.h"
+#include "diagnosis/targets/shape_draws.h"
 #include "meshing/topology.h"
 #include "simulation/catalogue.h"
 
@@ -280,14 +282,17 @@ TargetRegions find_regions(const TargetQuestion& question, calibration::Evaluato
   const simulation::Embedding points(*question.mesh, places.imaged);
   const PointMoves moves =
       moves_of(at, points, *base.parameters, base.fit.u, nuisances, priors.patchiness, measured.discrepancy.forces);
-  fill_targets(moves, effect_moves(*question.mesh, *question.anatomy, at, points, missing.candidates), places.there,
-               joint);
+  fill_targets(moves, effect_moves(*question.mesh, *question.anatomy, at, points, missing.candidates), joint);
   const int row = row_of_pose(evaluator.scene(), question.pose.name);
-  fill_cross(base, measured.discrepancy, moves.forces, places.there, row, joint);
+  fill_kernels(base, measured.discrepancy, moves.forces, places.there, row, joint);
   const double mesh = base.numerical ? base.numerical->spread_mm : mesh_share_of_way() * at.way_mm();
   const double length = base.numerical ? std::max(5.0, base.numerical->length_mm) : beyond_forces_length_mm;
   const VectorXd finer = moved_by_finer_elements(question, places, base);
   joint.target_errors = mesh_errors(places.there, mesh, length) + finer * finer.transpose();
+  const JointMoves at_fit = joint;
+  if (base.size_mm >= least_size_of_mean_kernel_mm)
+    allow_for_shapes(evaluator.scene(), base,
+                     {question.mesh, question.anatomy, question.prone, question.pose, row, &places}, joint);
   const auto numbers = numbers_of(missing, joint, base.fit.u.size() + static_cast<Index>(nuisances.size()));
   TargetRegions regions = told(question, places, condition(joint), knowable(*base.parameters, nuisances, numbers));
   add_if_nothing_missing(joint, base.fit.u.size() + static_cast<Index>(nuisances.size()), places, regions);
@@ -300,7 +305,7 @@ TargetRegions find_regions(const TargetQuestion& question, calibration::Evaluato
   if (question.further_scans)
     add_further_scans(
         question,
-        {joint, base, nuisances, priors, measured.discrepancy.forces, measured.discrepancy.columns, moves.forces},
+        {at_fit, base, nuisances, priors, measured.discrepancy.forces, measured.discrepancy.columns, moves.forces},
         regions);
   for (TargetRegion& region : regions.points) keep_most(region.shrinks);
   if (const auto rows = landmark_rows(base.clusters, row); !rows.empty())
@@ -323,8 +328,8 @@ TargetRegions find_regions(const TargetQuestion& question, const simulation::Mod
   const BelievedEffects believed =
       believed_effects(model, *question.mesh, *question.anatomy, u.size(), nuisances, priors, may_lack);
   JointMoves joint = believed_part(free, nuisances, believed, priors, way);
-  fill_targets(moves, effect_moves(*question.mesh, *question.anatomy, at, points, believed.candidates), places.there,
-               joint);
+  fill_targets(moves, effect_moves(*question.mesh, *question.anatomy, at, points, believed.candidates), joint);
+  joint.target_kernel = target_kernel(moves.forces, places.there);
   joint.target_errors = mesh_errors(places.there, mesh_share_of_way() * way, beyond_forces_length_mm);
   TargetRegions regions = told(question, places, condition(joint), knowable(free, nuisances, believed.numbers));
   add_if_nothing_missing(joint, u.size() + static_cast<Index>(nuisances.size()), places, regions);

@@ -62,7 +62,10 @@ class PhantomTool : public Tool {
     app.add_flag("--tilt", options_.tilt, "also a scan of the body tilted by 45 degrees");
     app.add_option("--noise-mm", options_.noise_mm, "scanner noise along the normal, 1 sigma, 0 to 5")
         ->capture_default_str();
-    app.add_option("--voxel-mm", options_.voxel_mm, "of the labels, 0.5 to 4")->capture_default_str();
+    voxel_ = app.add_option("--voxel-mm", options_.voxel_mm,
+                            "of the labels, 0.5 to 4; with --mri across the body, default drawn")
+                 ->capture_default_str();
+    app.add_option("--slice-mm", slice_mm_, "with --mri and --voxel-mm: of the voxels along the body, 0.5 to 6");
     app.add_option("--rings", options_.rings, "fineness of the truth's mesh: rings of triangles on the skin, 4 to 30")
         ->capture_default_str();
     app.add_option("--order", options_.order, "of the truth's elements: 1 linear, 2 quadratic")->capture_default_str();
@@ -79,6 +82,7 @@ class PhantomTool : public Tool {
   Outcome run(Run& run) override {
     const fs::path folder = case_folder();
     if (!series_.empty()) return make_series(folder, run);
+    if (slice_mm_ != 0) throw InputError("--slice-mm goes with --mri: the labels of computed breasts have cubes");
     if (!gland_.empty()) throw InputError("--gland goes with --mri: computed breasts have a gland of their own");
     const fs::path answer = answer_file(folder);
     take_effects();
@@ -112,11 +116,13 @@ class PhantomTool : public Tool {
                         : series_ == "t2" ? phantom::Series::t2
                                           : phantom::Series::fatsat;
     const fs::path truth = folder.parent_path() / "answers" / (folder.filename().string() + ".nrrd");
+    const Eigen::Vector3d voxel_mm = series_voxel_mm();
     run.stage("make");
     run.progress("drawing the torso and its series");
     phantom::Torso torso(options_.seed);
     if (!gland_.empty()) torso.carry(read_anatomy(run));
-    const phantom::MadeSeries made = phantom::make_series(torso, options_.seed, {.series = series});
+    const phantom::MadeSeries made =
+        phantom::make_series(torso, options_.seed, {.series = series, .voxel_mm = voxel_mm});
     run.stage("write");
     Outputs outputs(run.force());
     phantom::write_series_folder(folder, truth, made, series, outputs);
@@ -125,6 +131,21 @@ class PhantomTool : public Tool {
     run.say(fmt::format("{}: {} x {} x {} voxels; what it was made of is in {}", folder.string(), size.x(), size.y(),
                         size.z(), truth.string()));
     return Outcome::done;
+  }
+
+  /// Zero where they are drawn.
+  Eigen::Vector3d series_voxel_mm() const {
+    if (voxel_->count() == 0 && slice_mm_ == 0) return Eigen::Vector3d::Zero();
+    constexpr double least = 0.5, most_across = 4, most_along = 6;
+    if (voxel_->count() == 0 || slice_mm_ == 0)
+      throw InputError("with --mri --voxel-mm and --slice-mm go together: give both, or neither to have them drawn");
+    const double across = options_.voxel_mm;
+    if (!(across >= least && across <= most_across) || !(slice_mm_ >= least && slice_mm_ <= most_along))
+      throw InputError(
+          fmt::format("voxels of {:g} x {:g} x {:g} mm: --voxel-mm must lie in [{}, {}], --slice-mm in "
+                      "[{}, {}]",
+                      across, across, slice_mm_, least, most_across, least, most_along));
+    return {across, across, slice_mm_};
   }
 
   std::shared_ptr<const phantom::Anatomy> read_anatomy(Run& run) const {
@@ -264,6 +285,8 @@ class PhantomTool : public Tool {
 
   phantom::PhantomOptions options_;
   std::string population_ = "benchmark", series_;
+  CLI::Option* voxel_ = nullptr;
+  double slice_mm_ = 0;  // 0: drawn
   std::vector<std::string> effects_;
   fs::path answer_, gland_;
 };

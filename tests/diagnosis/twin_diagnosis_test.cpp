@@ -5,65 +5,19 @@
 #include <cmath>
 #include <set>
 
-#include "diagnosis/examine.h"
 #include "diagnosis/hot_spots.h"
 #include "diagnosis/ladder.h"
 #include "diagnosis/next_measurement.h"
 #include "diagnosis/range_ends.h"
-#include "simulation/parameters.h"
-#include "tests/calibration/twin.h"
+#include "tests/diagnosis/twin_findings.h"
 
 namespace supine::diagnosis {
 namespace {
 
-using supine::testing::Twin;
-
-constexpr double noise_mm = 0.3;
-
-/// The scan lies where it is said to, on an even body: what the twins are.
-Priors twin_priors() {
-  Priors priors;
-  priors.known.registration_mm = 0.05, priors.known.registration_rad = 0.001;
-  priors.known.segmentation_mm = priors.known.chest_wall_mm = 0.05;
-  priors.known.gravity_rad = 0.002;
-  priors.patchiness = {.tissue = 0.02, .skin = 0.02, .muscle_mm = 0.02};
-  priors.scan_shared_mm = 0.02;
-  return priors;
-}
-
-Subject subject_of(const Twin& twin) {
-  return {twin.scene(), supine::testing::twin_truth(), supine::testing::twin_truth(), {noise_mm}, nullptr};
-}
-
-/// Scan and model share their mesh here, so there is no numerical error to be measured.
-std::unique_ptr<Findings> findings_of(const Subject& subject, int refits = 5) {
-  ExamineOptions options;
-  options.other_meshes = false;
-  options.refits = refits;
-  options.priors = twin_priors();
-  return examine(subject, options);
-}
-
-std::unique_ptr<Findings> findings_of(const Twin& twin, int refits = 5) {
-  return findings_of(subject_of(twin), refits);
-}
-
-simulation::Model with(const std::string& effect, const std::string& parameter, double value) {
-  simulation::Model model = supine::testing::twin_truth();
-  simulation::EffectSetting setting = free_setting(effect);
-  setting.parameters.at(parameter).value = value;
-  model.effects = {setting};
-  return model;
-}
-
-bool names(const Diagnosis& diagnosis, const std::string& effect) {
-  return std::find(diagnosis.missing.begin(), diagnosis.missing.end(), effect) != diagnosis.missing.end();
-}
-
 class NullTwin : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    twin = new Twin({supine::testing::twin_truth(), noise_mm});
+    twin = new Twin({supine::testing::twin_truth(), twin_noise_mm});
     found = findings_of(*twin).release();
   }
   static void TearDownTestSuite() {
@@ -96,25 +50,20 @@ TEST_F(NullTwin, TheLikeliestSetsAreToldInTheirOrderAndNothingAmongThem) {
 }
 
 TEST_F(NullTwin, TheBudgetHoldsTheNoiseAndWhatIsUnexplained) {
-  EXPECT_NEAR(found->budget.noise, noise_mm, 0.05);
+  EXPECT_NEAR(found->budget.noise, twin_noise_mm, 0.05);
   EXPECT_NEAR(found->budget.total, found->rms_mm, 1e-12);
   EXPECT_EQ(found->budget.model_form, found->unexplained.mean_mm);
   // What places and moduli leave to doubt once this scan is fitted: less than it errs, more than nothing.
   for (const double doubt : {found->budget.registration, found->budget.parameters}) {
     EXPECT_GT(doubt, 0.005);
-    EXPECT_LT(doubt, noise_mm);
+    EXPECT_LT(doubt, twin_noise_mm);
   }
 }
 
 TEST_F(NullTwin, AScanThatLiesElsewhereIsFoundThere) {
   Subject subject = subject_of(*twin);
-  const calibration::Scan& scan = twin->measurement->scan;
   const Eigen::RowVector3d shift(1.5, -2, 1);
-  reconstruction::Surface surface;
-  surface.points = scan.points().rowwise() + shift;
-  surface.triangles = scan.distance().triangles();
-  const calibration::ModelSkin skin(twin->mesh, twin->solution.poses[0].x);
-  const calibration::Measurement moved{twin->measurement->pose, calibration::Scan(surface, skin), noise_mm};
+  const calibration::Measurement moved = scan_elsewhere(*twin, shift);
   subject.scene.measurements = {&moved};
   ExamineOptions options;
   options.other_meshes = false;
@@ -229,13 +178,13 @@ TEST_F(NullTwin, NoHotSpotWithoutDistance) {
 }
 
 TEST(TwinDiagnosis, ALigamentIsNamedByTwoScansTogetherAndEachPredictedFromTheOtherBearsItOut) {
-  const simulation::Model truth = with("ligament", "stiffness_kpa_per_mm", 2.0);
-  const Twin twin({truth, noise_mm}), again({truth, noise_mm, 2});
+  const simulation::Model truth = twin_with("ligament", "stiffness_kpa_per_mm", 2.0);
+  const Twin twin({truth, twin_noise_mm}), again({truth, twin_noise_mm, 2});
   Subject subject = subject_of(twin);
   calibration::Measurement second = std::move(*again.measurement);
   second.pose.name = "again";
   subject.scene.measurements.push_back(&second);
-  subject.noise_mm.push_back(noise_mm);
+  subject.noise_mm.push_back(twin_noise_mm);
   const auto found = findings_of(subject, 3);
   EXPECT_EQ(found->diagnosis.verdict, Verdict::missing) << found->diagnosis.why;
   EXPECT_TRUE(names(found->diagnosis, "ligament"));
@@ -243,81 +192,10 @@ TEST(TwinDiagnosis, ALigamentIsNamedByTwoScansTogetherAndEachPredictedFromTheOth
   EXPECT_GT(found->included.front().left_out_gain, 0);
 }
 
-TEST(TwinDiagnosis, LinesFromItsUsualSizeShowMoreOfALigamentThanLinesFromNothing) {
-  const Twin twin({with("ligament", "stiffness_kpa_per_mm", 2.0), noise_mm});
-  const Subject subject = subject_of(twin);
-  const auto found = findings_of(subject, 0);
-  const auto effects = found->effects();
-  const int ligament = static_cast<int>(std::find(effects.begin(), effects.end(), "ligament") - effects.begin());
-  const auto single = [ligament](const std::vector<Hypothesis>& list) {
-    return *std::find_if(list.begin(), list.end(),
-                         [ligament](const Hypothesis& h) { return h.effects == std::vector{ligament}; });
-  };
-  std::vector<Hypothesis> list = found->hypotheses;
-  weigh_from_usual_size(subject.scene, subject.given, found->base, found->candidates, {}, list);
-  const Hypothesis before = single(found->hypotheses), after = single(list);
-  EXPECT_TRUE(after.from_usual);
-  EXPECT_FALSE(after.refitted);
-  EXPECT_GT(after.probability, before.probability);
-  Refit followed = refit(subject.scene, subject.given, found->base, found->base, found->candidates, after);
-  ASSERT_TRUE(followed.solved);
-  EXPECT_LT(std::abs(after.ln_evidence - followed.hypothesis.ln_evidence),
-            0.5 * std::abs(before.ln_evidence - followed.hypothesis.ln_evidence));
-  // Laplace's formula and the curve of the strength tell of one body: no end of the curve makes evidence of its own.
-  const std::vector<FittedParameter> by_laplace = followed.parameters;
-  const double gain = find_strength_densities(subject.scene, found->candidates, followed);
-  EXPECT_NEAR(gain, 0, 5);
-  EXPECT_EQ(followed.hypothesis.ln_evidence, followed.hypothesis.weighed.ln_evidence + gain);
-  EXPECT_GT(followed.parameters.at(0).high, by_laplace.at(0).high) << "a ligament saturates: its upper end is long";
-  EXPECT_EQ(find_strength_densities(subject.scene, found->candidates, followed), 0) << "once is enough";
-}
-
-TEST(Refit, AnEffectDoesNothingWhereAllItsStrengthsMayBeWhatTheyAreWithoutIt) {
-  Candidate tilt;
-  for (const char* name : {"gravity_tilt.roll_rad", "gravity_tilt.pitch_rad"})
-    tilt.parameters.emplace_back().name = name, tilt.parameters.back().null = 0;
-  Refit refit;
-  refit.parameters = {{"gravity_tilt.roll_rad", "rad", 0.01, -0.02, 0.04},
-                      {"breast.young_modulus_kpa", "kPa", 1, 0.5, 2}};
-  EXPECT_FALSE(does_nothing(refit, tilt)) << "one of its numbers was not fitted";
-  refit.parameters.push_back({"gravity_tilt.pitch_rad", "rad", -0.01, -0.03, 0.01});
-  EXPECT_TRUE(does_nothing(refit, tilt));
-  refit.parameters.back().high = -0.001;
-  EXPECT_FALSE(does_nothing(refit, tilt));
-}
-
-TEST(TwinDiagnosis, APartOfASetIsFoundFromWhereTheWholeEnded) {
-  const Twin twin({with("chest_wall_motion", "amplitude_mm", 6), noise_mm});
-  const Subject subject = subject_of(twin);
-  const auto found = findings_of(subject, 0);
-  const auto effects = found->effects();
-  const auto place = [&effects](const char* name) {
-    return static_cast<int>(std::find(effects.begin(), effects.end(), name) - effects.begin());
-  };
-  const int hill = place("chest_wall_motion"), idle = place("incompressibility");
-  const auto set = [&](std::vector<int> which) {
-    std::sort(which.begin(), which.end());
-    return *std::find_if(found->hypotheses.begin(), found->hypotheses.end(),
-                         [&which](const Hypothesis& h) { return h.effects == which; });
-  };
-  const Refit whole =
-      refit(subject.scene, subject.given, found->base, found->base, found->candidates, set({hill, idle}));
-  ASSERT_TRUE(whole.solved);
-  EXPECT_FALSE(does_nothing(whole, found->candidates[static_cast<std::size_t>(hill)]));
-  const Refit alone = refit(subject.scene, subject.given, found->base, found->base, found->candidates, set({hill}));
-  const Refit within = refit_within(subject.scene, subject.given, found->base, whole, found->candidates, set({hill}));
-  ASSERT_TRUE(within.solved);
-  EXPECT_EQ(within.effects, std::vector<std::string>{"chest_wall_motion"});
-  EXPECT_LT(whole.joint.nuisances.size(), alone.joint.nuisances.size());
-  EXPECT_EQ(within.joint.nuisances.size(), alone.joint.nuisances.size()) << "what the idle effect had replaced is back";
-  EXPECT_NEAR(within.hypothesis.ln_evidence, alone.hypothesis.ln_evidence, 1);
-  EXPECT_NEAR(within.parameters.at(0).value, alone.parameters.at(0).value, 0.5);
-}
-
 TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
-  simulation::Model truth = with("chest_wall_motion", "amplitude_mm", 6);
+  simulation::Model truth = twin_with("chest_wall_motion", "amplitude_mm", 6);
   truth.effects[0].parameters.at("centre_lateral").value = 0.35;
-  const Twin twin({truth, noise_mm});
+  const Twin twin({truth, twin_noise_mm});
   const auto found = findings_of(twin, 3);
   ASSERT_EQ(found->diagnosis.verdict, Verdict::missing) << found->diagnosis.why;
   ASSERT_TRUE(names(found->diagnosis, "chest_wall_motion")) << found->diagnosis.why;
@@ -340,27 +218,9 @@ TEST(TwinDiagnosis, AHillOfTheChestWallIsFoundWhereItStands) {
   EXPECT_EQ(seen, 2);
 }
 
-TEST(TwinDiagnosis, ARefitSaysThatAPlaceEndsAtTheBorderOfItsRange) {
-  const auto ends_there = [](double centre) {
-    simulation::Model truth = with("chest_wall_motion", "amplitude_mm", 8);
-    truth.effects[0].parameters.at("centre_lateral").value = centre;
-    const Twin twin({truth, noise_mm});
-    const Subject subject = subject_of(twin);
-    const auto found = findings_of(subject, 0);
-    const auto names = found->effects();
-    const int hill = static_cast<int>(std::find(names.begin(), names.end(), "chest_wall_motion") - names.begin());
-    for (const Hypothesis& h : found->hypotheses)
-      if (h.effects == std::vector{hill})
-        return refit(subject.scene, subject.given, found->base, found->base, found->candidates, h).at_border;
-    return false;
-  };
-  EXPECT_TRUE(ends_there(0.55));
-  EXPECT_FALSE(ends_there(0.2));
-}
-
 TEST(TwinDiagnosis, AnErrorOfMeasurementAtTheEndOfItsRangeIsNoFindingAndOneInsideIs) {
   const auto ends = [](const std::string& effect, const std::string& parameter, double value) {
-    const auto found = findings_of(Twin({with(effect, parameter, value), noise_mm}), 3);
+    const auto found = findings_of(Twin({twin_with(effect, parameter, value), twin_noise_mm}), 3);
     std::string told = verdict_name(found->diagnosis.verdict) + ":";
     for (const std::string& name : found->diagnosis.missing) told += " " + name;
     for (const Refit& refit : found->refits)
@@ -381,9 +241,9 @@ TEST(TwinDiagnosis, AnErrorOfMeasurementAtTheEndOfItsRangeIsNoFindingAndOneInsid
 }
 
 TEST(TwinDiagnosis, ALadderAddsTwoEffectsOneAfterTheOtherAndShowsWhatElseCouldHaveBeenAdded) {
-  simulation::Model truth = with("gravity_tilt", "roll_rad", 0.2);
-  truth.effects.push_back(with("chest_wall_motion", "amplitude_mm", 7).effects[0]);
-  const Twin twin({truth, noise_mm});
+  simulation::Model truth = twin_with("gravity_tilt", "roll_rad", 0.2);
+  truth.effects.push_back(twin_with("chest_wall_motion", "amplitude_mm", 7).effects[0]);
+  const Twin twin({truth, twin_noise_mm});
   const Subject subject = subject_of(twin);
   ExamineOptions options;
   options.other_meshes = false;
@@ -421,14 +281,14 @@ TEST(TwinDiagnosis, TheMapOfMissingForcesShowsATractionAndStaysBelowItsThreshold
     const FitErrors errors(found.base, found.base.nuisances, 0);
     return force_map(twin.scene(), found.base.model, found.base.fit, errors.metric(), 1, 40);
   };
-  const Twin pulled({with("arm_traction", "lateral_kpa", 0.3), noise_mm});
+  const Twin pulled({twin_with("arm_traction", "lateral_kpa", 0.3), twin_noise_mm});
   const auto found = findings_of(pulled, 0);
   const ForceMap map = map_of(pulled, *found);
   EXPECT_GT(map.evidence_gain, map.null_gain);
   Eigen::Index strongest;
   EXPECT_GT(map.force_kpa.rowwise().norm().maxCoeff(&strongest), map.threshold_kpa);
   EXPECT_GT(map.force_kpa.row(strongest).dot(pulled.anatomy.lateral), 0);
-  const Twin quiet({supine::testing::twin_truth(), noise_mm});
+  const Twin quiet({supine::testing::twin_truth(), twin_noise_mm});
   const auto nothing = findings_of(quiet, 0);
   const ForceMap none = map_of(quiet, *nothing);
   EXPECT_LT(none.evidence_gain, 0.2 * map.evidence_gain);

@@ -4,16 +4,19 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "common/statistics.h"
+#include "diagnosis/evidence/mean_kernel.h"
 #include "diagnosis/targets/draws.h"
 #include "diagnosis/targets/further_scan.h"
 #include "diagnosis/targets/joint_moves.h"
 #include "diagnosis/targets/moves.h"
 #include "diagnosis/targets/places.h"
+#include "diagnosis/targets/shape_draws.h"
 #include "diagnosis/weighted_fit.h"
 #include "simulation/catalogue.h"
 #include "simulation/parameters.h"
@@ -94,6 +97,34 @@ TEST(PointMoves, AreThoseOfTheModelSolvedAgain) {
         << nuisances[k].name();
   }
   EXPECT_GE(moved, 5) << "gravity, breath, skin, springs";
+}
+
+TEST(ShapeDraws, KernelsOfDistancesAndPlacesAreMovedTogetherAndStayACovariance) {
+  Fitted f;
+  const simulation::PoseLoad &prone = f.question.prone, &pose = f.question.pose;
+  const auto nuisances = with_those_of(f.base.model, f.base.nuisances, prone.name, pose.name, f.priors);
+  MeasuredPart measured = measured_part(f.evaluator, f.base, {}, f.priors, nuisances);
+  const PoseAt at(f.twin.mesh, f.twin.anatomy, prone, pose, f.base.model, &f.base.fit.prediction.solution);
+  const Places places = places_of(f.twin.mesh, f.question.imaged, at.x(), -pose.gravity);
+  const PointMoves moves = moves_of(at, simulation::Embedding(f.twin.mesh, places.imaged), *f.base.parameters,
+                                    f.base.fit.u, nuisances, f.priors.patchiness, measured.discrepancy.forces);
+  JointMoves joint = measured.joint;
+  fill_kernels(f.base, measured.discrepancy, moves.forces, places.there, 0, joint);
+  const JointMoves at_fit = joint;
+  allow_for_shapes(f.twin.scene(), f.base, {&f.twin.mesh, &f.twin.anatomy, prone, pose, 0, &places}, joint);
+  EXPECT_LT((joint.data_kernel - mean_kernel(f.twin.scene(), f.base)).norm(), 1e-9 * joint.data_kernel.norm());
+  const auto moved = [](const Eigen::MatrixXd& now, const Eigen::MatrixXd& before) {
+    return (now - before).norm() / before.norm();
+  };
+  for (const double share :
+       {moved(joint.cross_kernel, at_fit.cross_kernel), moved(joint.target_kernel, at_fit.target_kernel)}) {
+    EXPECT_GT(share, 1e-4);
+    EXPECT_LT(share, 0.2);
+  }
+  const Eigen::Index n = joint.data_kernel.rows(), t = joint.target_kernel.rows();
+  Eigen::MatrixXd together(n + t, n + t);
+  together << joint.data_kernel, joint.cross_kernel.transpose(), joint.cross_kernel, joint.target_kernel;
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(together).eigenvalues()[0], -1e-9 * together.norm());
 }
 
 TEST(PlacesOfTargets, NearestSkinAndTheSkinAboveAreOnTheSkin) {
