@@ -165,11 +165,14 @@ void follow(const Subject& subject, const ExamineOptions& options, Findings& fou
     sets.settle_strengths();
   }
   if (options.refits > 0) {
+    std::vector<std::vector<int>> looked_at;
+    follow_parts_of_first(sets, looked_at);
     look_beside(sets);
     if (do_without_idle(sets)) {
       sets.settle_strengths();
       look_beside(sets);
     }
+    follow_parts_of_first(sets, looked_at);
   }
   const auto rank = [&found](const Refit& refit) {
     for (const Hypothesis& h : found.hypotheses)

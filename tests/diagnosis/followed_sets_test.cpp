@@ -124,6 +124,31 @@ TEST(FollowedSets, WhatWasMeasuredBesideAnEffectThatDoesNothingIsDroppedWithIt) 
   EXPECT_FALSE(do_without_idle(sets));
 }
 
+TEST(FollowedSets, APartThatEndedElsewhereIsFollowedFromTheWhole) {
+  const Twin twin({twin_with("chest_wall_motion", "amplitude_mm", 6), twin_noise_mm});
+  const Subject subject = subject_of(twin);
+  const auto found = findings_of(subject, 0);
+  const ExamineOptions options = twin_options(5);
+  FollowedSets sets(subject, options, *found);
+  const int hill = row_of(*found, "chest_wall_motion"), idle = row_of(*found, "incompressibility");
+  std::vector<int> both{hill, idle};
+  std::sort(both.begin(), both.end());
+  for (const std::vector<int>& set : {{hill}, both}) sets.follow_one(set);
+  const double well = sets.hypothesis_of({hill}).ln_evidence;
+  constexpr double elsewhere = 15;
+  sets.hypothesis_of({hill}).ln_evidence -= elsewhere;
+  sets.refit_of({hill})->hypothesis.ln_evidence -= elsewhere;
+  sets.weigh();
+  ASSERT_EQ(found->hypotheses.front().effects, both);
+  std::vector<std::vector<int>> looked_at;
+  follow_parts_of_first(sets, looked_at);
+  EXPECT_EQ(looked_at, std::vector<std::vector<int>>(1, both));
+  EXPECT_EQ(found->hypotheses.front().effects, std::vector{hill});
+  EXPECT_NEAR(sets.hypothesis_of({hill}).ln_evidence, well, 1);
+  const auto is_of_hill = [hill](const Refit& refit) { return refit.hypothesis.effects == std::vector{hill}; };
+  EXPECT_EQ(std::count_if(found->refits.begin(), found->refits.end(), is_of_hill), 1) << "of two fits one is kept";
+}
+
 TEST(Follow, AScanThatLiesFarOffIsPutInItsPlaceFirst) {
   const Twin twin({supine::testing::twin_truth(), twin_noise_mm});
   const auto first_told = [&twin](const Eigen::RowVector3d& shift_mm) {
