@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""How often the 95 % regions of supine-targets hold the truth: target_coverage.py CASES WORK [BIN] [--only WORDS] [--diagnose] [--score]
+"""How often the 95 % regions of supine-targets hold the truth: target_coverage.py CASES WORK [BIN] [--only WORDS] [--diagnose | --runs OUT] [--score]
 
-CASES holds case folders and answers/NAME.json. Where the answer has `targets` (supine-phantom), those places are asked for; landmarks that were
+CASES holds case folders and answers/NAME.json (or those lie beside it, as bench/hidden.py has them). Where the answer has `targets` (supine-phantom), those places are asked for; landmarks that were
 measured in the pose are held against where all else expects them, in every case. Meshes and answers of the tool go to WORK and are kept: what is
 there is not made again. --diagnose climbs the ladder first, from the case's own model, and asks with the model at its end for regions over the
-sets that supine-diagnose finds, in place of straight lines at a fit of a model that lacks them. --score makes nothing and counts what is there.
+sets that supine-diagnose finds, in place of straight lines at a fit of a model that lacks them. --runs takes meshes, calibrated models and diagnoses
+from OUT/NAME, as bench/hidden.py leaves them: what `make targets` does after `make diagnose`. --score makes nothing and counts what is there.
 """
 import argparse
 import csv
@@ -26,6 +27,25 @@ def run(binaries, tool, *words):
         raise RuntimeError(f"supine-{tool}: {done.stderr.strip()}")
 
 
+def points_asked(answer, out):
+    if "targets" not in answer:
+        return []
+    with open(out / "asked.csv", "w", newline="", encoding="utf-8") as stream:
+        table = csv.writer(stream, lineterminator="\n")
+        table.writerow(["name", "x", "y", "z"])
+        table.writerows([t["name"], *t["prone_mm"]] for t in answer["targets"])
+    return ["--points", out / "asked.csv"]
+
+
+def ask_of_run(binaries, case, answer, out, finished):
+    """Regions of a case that was meshed, calibrated and diagnosed."""
+    if not (finished / "diagnosis.json").exists():
+        raise RuntimeError(f"{finished} has no diagnosis")
+    out.mkdir(parents=True, exist_ok=True)
+    run(binaries, "targets", case, finished / "mesh.vtu", *points_asked(answer, out), "--model", finished / "model.toml", "--diagnosis",
+        finished / "diagnosis.json", "--pose", POSE, "--no-further-scans", "-o", out / "targets")
+
+
 def make(binaries, case, answer, out, diagnose):
     """Mesh and regions of a case."""
     out.mkdir(parents=True, exist_ok=True)
@@ -33,13 +53,7 @@ def make(binaries, case, answer, out, diagnose):
                           capture_output=True, text=True)
     if done.returncode != 0:
         raise RuntimeError(f"make mesh: {done.stderr.strip()[-300:]}")
-    asked = []
-    if "targets" in answer:
-        with open(out / "asked.csv", "w", newline="", encoding="utf-8") as stream:
-            table = csv.writer(stream, lineterminator="\n")
-            table.writerow(["name", "x", "y", "z"])
-            table.writerows([t["name"], *t["prone_mm"]] for t in answer["targets"])
-        asked = ["--points", out / "asked.csv"]
+    asked = points_asked(answer, out)
     if diagnose:
         ladder = out / "ladder"
         run(binaries, "diagnose", case, out / "mesh.vtu", "--model", case / "model.toml", "--ladder", "-o", ladder)
@@ -134,17 +148,21 @@ def main():
     parser.add_argument("bin", type=pathlib.Path, nargs="?", default=pathlib.Path("build/bin"))
     parser.add_argument("--only", default="")
     parser.add_argument("--diagnose", action="store_true")
+    parser.add_argument("--runs", type=pathlib.Path)
     parser.add_argument("--score", action="store_true")
     given = parser.parse_args()
     groups = {}
     for case in sorted(path.parent for path in given.cases.glob("*/case.toml") if given.only in path.parent.name):
-        answer = json.loads((given.cases / "answers" / f"{case.name}.json").read_text())
+        answers = given.cases / "answers"
+        answer = json.loads(((answers if answers.exists() else given.cases.parent / "answers") / f"{case.name}.json").read_text())
         out = given.work / case.name
         told = out / "targets" / f"{POSE}_landmarks.json"
         if not told.exists() and given.score:
             continue
         try:
-            if not told.exists():
+            if not told.exists() and given.runs:
+                ask_of_run(given.bin.resolve(), case, answer, out, given.runs / case.name)
+            elif not told.exists():
                 make(given.bin.resolve(), case, answer, out, given.diagnose)
         except RuntimeError as why:
             print(f"{case.name}: {why}", file=sys.stderr)
