@@ -359,6 +359,16 @@ TEST_F(Calibrate, DiagnosisAsksTheWholeCatalogue) {
   EXPECT_LT(refitted, static_cast<int>(result["candidates"].size())) << "six times --refit sets at the most";
 }
 
+TEST_F(Calibrate, PlacesAreAskedOfWhatTheSameCallFindsOut) {
+  std::vector<std::string> command = make_command(folder());
+  command.insert(command.end(), {"--dry-run", "diagnose", "targets"});
+  const Finished told = run_process(command);
+  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_NE(told.out.find("out/model.toml --diagnosis "), std::string::npos) << told.out;
+  command.insert(command.end() - 1, "ladder");
+  EXPECT_NE(run_process(command).out.find("out/ladder/model.toml --diagnosis "), std::string::npos);
+}
+
 TEST_F(Calibrate, MakeGoesFromTheMeshToTheDiagnosisAndRunsNothingTwice) {
   write_text(folder() / "model.toml", soft_text);
   std::vector<std::string> command = make_command(folder());
