@@ -34,20 +34,24 @@ void look_from_usual_sizes(FollowedSets& sets) {
                         unsettled(sets.found.table), sets.found.hypotheses);
 }
 
-/// Whether some scan lies where one in a thousand would by what is believed of places.
-bool is_misplaced(const BaseFit& base) {
+/// The effect that moves scans, where one of them lies where one in a thousand would by what is believed of places;
+/// empty where none does.
+std::string mover_of_misplaced(const BaseFit& base) {
   std::map<std::string, double> squares;
-  for (const Nuisance& nuisance : base.nuisances)
-    if (nuisance.effect == "misregistration") squares[nuisance.pose] += nuisance.value * nuisance.value;
-  return std::any_of(squares.begin(), squares.end(), [](const auto& of_pose) { return of_pose.second > rare_place; });
+  for (const Nuisance& nuisance : base.nuisances) {
+    if (nuisance.source != "registration") continue;
+    squares[nuisance.pose] += nuisance.value * nuisance.value;
+    if (squares[nuisance.pose] > rare_place) return nuisance.effect;
+  }
+  return {};
 }
 
 /// Closest points of a scan that lies far off are others where it belongs: lines from a fit that believes it nearer
 /// show what is not there, and it is found first. @return  whether that is the likeliest since
 bool follow_misplaced(FollowedSets& sets) {
   const auto names = sets.found.effects();
-  const auto place = std::find(names.begin(), names.end(), "misregistration");
-  if (place == names.end() || !is_misplaced(sets.found.base)) return false;
+  const auto place = std::find(names.begin(), names.end(), mover_of_misplaced(sets.found.base));
+  if (place == names.end()) return false;
   sets.follow_one({static_cast<int>(place - names.begin())});
   return sets.first_holds_an_effect() && sets.found.hypotheses.front().refitted;
 }
