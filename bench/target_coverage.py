@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """How often the 95 % regions of supine-targets hold the truth: target_coverage.py CASES WORK [BIN] [--only WORDS] [--diagnose | --runs OUT] [--score]
 
-CASES holds case folders and answers/NAME.json (or those lie beside it, as bench/hidden.py has them). Where the answer has `targets` (supine-phantom), those places are asked for; landmarks that were
-measured in the pose are held against where all else expects them, in every case. Meshes and answers of the tool go to WORK and are kept: what is
-there is not made again. --diagnose climbs the ladder first, from the case's own model, and asks with the model at its end for regions over the
+CASES holds case folders and answers/NAME.json (or those lie beside it, as bench/hidden.py has them). Where the answer has `targets`
+(supine-phantom), those places are asked for; landmarks that were measured in the pose are held against where all else expects them, in every case.
+Meshes and answers of the tool go to WORK and are kept: what is there is not made again. --diagnose climbs the ladder first, from the case's own model, and asks with the model at its end for regions over the
 sets that supine-diagnose finds, in place of straight lines at a fit of a model that lacks them. --runs takes meshes, calibrated models and diagnoses
 from OUT/NAME, as bench/hidden.py leaves them: what `make targets` does after `make diagnose`. --score makes nothing and counts what is there.
 """

@@ -5,7 +5,7 @@
 
 namespace supine::diagnosis {
 
-/// Chain of the poses of a question, and its points on the mesh.
+/// The pose that places are asked for, and the places.
 struct TargetPose {
   const meshing::TetMesh* mesh;
   const meshing::Anatomy* anatomy;

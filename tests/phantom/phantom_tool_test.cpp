@@ -174,6 +174,15 @@ TEST(PhantomTool, OverwritesOnlyWhenForced) {
   EXPECT_NE(read_text(folder / "case-001/supine.ply"), before);
 }
 
+TEST(PhantomTool, VoxelsOfAMadeSeriesAreThoseAskedFor) {
+  TemporaryFolder folder;
+  const Finished made =
+      run_process({tool("phantom"), "--mri", "t1", "--voxel-mm", "4", "--slice-mm", "6", "-o", folder / "case-001"});
+  ASSERT_EQ(made.code, 0) << made.err;
+  const std::string header = read_text(folder / "case-001" / "mri.nrrd").substr(0, 300);
+  EXPECT_NE(header.find("space directions: (4,0,0) (0,4,0) (0,0,6)"), std::string::npos) << header;
+}
+
 // The whole way on a null: what calibration says of the moduli holds the truth.
 TEST(PhantomTool, CalibratedNullComesBackToItsModuli) {
   TemporaryFolder folder;
