@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <optional>
 #include <set>
 
 #include "diagnosis/score_test.h"
@@ -79,6 +80,131 @@ std::vector<std::string> likely_effects(const std::vector<Hypothesis>& hypothese
   return named;
 }
 
+/// What the verdict rests on.
+struct Odds {
+  Odds(const std::vector<Hypothesis>& sets, const std::vector<std::string>& names,
+           const std::vector<Inclusion>& inclusion_of, const Unexplained& rest, const Priors& beliefs,
+           const std::vector<std::string>& unseen)
+      : hypotheses(sets), effects(names), included(inclusion_of), unexplained(rest), priors(beliefs) {
+    nothing = probability_of_nothing(sets);
+    local = probability_of_unlisted(sets);
+    local_is_likelier = is_likelier_than_before(local, beliefs.unlisted);
+    for (const Inclusion& one : included) {
+      if (one.probability >= priors.named_at)
+        (!one.ends_at.empty()                    ? at_end
+         : one.left_out_gain > speaks_against    ? sure
+                                                 : denied)
+            .push_back(&one);
+      if (is_left_open(priors, one)) expected_is_open = true;
+      if (is_left_open(priors, one) && std::find(unseen.begin(), unseen.end(), one.effect) != unseen.end())
+        unsettled.push_back(one.effect);
+      effect_is_likelier = effect_is_likelier || one.bayes_factor >= settling_factor ||
+                           (priors.is_expected(one.effect) && one.probability > nothing);
+    }
+  }
+
+  /// Something is likelier than it was, and that nothing is missing is not.
+  bool something_is_likely() const {
+    return ((effect_is_likelier || local_is_likelier) && nothing < nothing_unlikely) || nothing < nothing_excluded;
+  }
+
+  template <class Pass>
+  std::vector<std::string> likely(Pass pass) const {
+    return likely_effects(hypotheses, effects, included, pass);
+  }
+  std::vector<std::string> best() const {
+    return included.empty() ? std::vector<std::string>{} : std::vector<std::string>{included.front().effect};
+  }
+
+  const std::vector<Hypothesis>& hypotheses;
+  const std::vector<std::string>& effects;
+  const std::vector<Inclusion>& included;
+  const Unexplained& unexplained;
+  const Priors& priors;
+  double nothing = 0, local = 0;
+  bool effect_is_likelier = false, local_is_likelier = false, expected_is_open = false;
+  std::vector<const Inclusion*> sure, denied, at_end;  // likely enough to be named; by what speaks against it
+  std::vector<std::string> unsettled;                  // expected, and this scan could not show it
+};
+
+using Rule = std::optional<Diagnosis>;
+
+Rule missing(const Odds& known) {
+  if (known.sure.empty()) return {};
+  Diagnosis result{Verdict::missing};
+  for (const Inclusion* one : known.sure) result.missing.push_back(one->effect);
+  result.ambiguous_rest = known.likely([&known](const Inclusion& one) {
+    return (one.probability < known.priors.named_at || !one.ends_at.empty()) &&
+           (one.bayes_factor >= settling_factor || is_left_open(known.priors, one));
+  });
+  result.why = fmt::format("probability {:.2f} or more", known.priors.named_at);
+  return result;
+}
+
+Rule at_an_end(const Odds& known) {
+  if (known.at_end.empty()) return {};
+  const Inclusion& first = *known.at_end.front();
+  return Diagnosis{
+      Verdict::unexplained,
+      {first.effect},
+      {},
+      fmt::format("{} would have to be at the end of its range: something else, that looks like it", first.ends_at)};
+}
+
+Rule surely_local(const Odds& known) {
+  if (known.local < known.priors.named_at) return {};
+  return Diagnosis{
+      Verdict::unexplained, known.best(),
+      known.likely([](const Inclusion& one) { return one.bayes_factor >= settling_factor; }),
+      fmt::format("a local cause that the catalogue does not list has probability {:.2f}", known.local)};
+}
+
+Rule rather_local(const Odds& known) {
+  const bool first = known.local > probability_of_some_effect(known.hypotheses);
+  if (!known.something_is_likely() || !known.local_is_likelier || !first || !known.denied.empty() ||
+      !known.unsettled.empty())
+    return {};
+  return Diagnosis{Verdict::unexplained,
+                   known.best(),
+                   {},
+                   fmt::format("something local that the catalogue does not list has probability {:.2f}, that nothing "
+                               "is missing {:.2f}",
+                               known.local, known.nothing)};
+}
+
+Rule undecided(const Odds& known) {
+  const bool likely = known.something_is_likely();
+  if (!likely && known.unsettled.empty()) return {};
+  Diagnosis result{Verdict::ambiguous};
+  const bool any = !known.effect_is_likelier && !known.expected_is_open;
+  result.missing = known.likely([&](const Inclusion& one) {
+    return any || one.bayes_factor >= settling_factor || is_left_open(known.priors, one);
+  });
+  std::vector<std::string> denied;
+  for (const Inclusion* one : known.denied) denied.push_back(one->effect);
+  result.why = denied.empty() ? fmt::format("that nothing is missing has probability {:.2f}", known.nothing)
+                              : fmt::format("what was left out speaks against {}", fmt::join(denied, ", "));
+  if (!likely) result.why += fmt::format(", and this scan could not show {}", fmt::join(known.unsettled, " or "));
+  return result;
+}
+
+Rule not_explained(const Odds& known) {
+  const Unexplained& rest = known.unexplained;
+  if (rest.low_mm <= known.priors.unexplained_bound_mm) return {};
+  return Diagnosis{Verdict::unexplained,
+                   known.best(),
+                   {},
+                   fmt::format("{:.1f} mm [{:.1f}, {:.1f}] are explained by no effect of the catalogue", rest.mean_mm,
+                               rest.low_mm, rest.high_mm)};
+}
+
+Diagnosis nothing_missing(const Odds& known) {
+  return {Verdict::nothing_missing,
+          {},
+          known.likely([&known](const Inclusion& one) { return is_left_open(known.priors, one); }),
+          fmt::format("probability {:.2f}", known.nothing)};
+}
+
 }  // namespace
 
 std::string verdict_name(Verdict verdict) {
@@ -111,83 +237,10 @@ std::vector<Inclusion> inclusions(const std::vector<Hypothesis>& hypotheses, con
 Diagnosis decide(const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& effects,
                  const std::vector<Inclusion>& included, const Unexplained& unexplained, const Priors& priors,
                  const std::vector<std::string>& unseen) {
-  Diagnosis result;
-  const double nothing = probability_of_nothing(hypotheses), local = probability_of_unlisted(hypotheses);
-  std::vector<std::string> denied;
-  std::vector<Inclusion> at_end;
-  for (const Inclusion& one : included) {
-    if (one.probability < priors.named_at) continue;
-    if (!one.ends_at.empty())
-      at_end.push_back(one);
-    else
-      (one.left_out_gain > speaks_against ? result.missing : denied).push_back(one.effect);
-  }
-  if (!result.missing.empty()) {
-    result.verdict = Verdict::missing;
-    result.ambiguous_rest = likely_effects(hypotheses, effects, included, [&](const Inclusion& one) {
-      return (one.probability < priors.named_at || !one.ends_at.empty()) &&
-             (one.bayes_factor >= settling_factor || is_left_open(priors, one));
-    });
-    result.why = fmt::format("probability {:.2f} or more", priors.named_at);
-    return result;
-  }
-  if (!at_end.empty()) {
-    result.verdict = Verdict::unexplained;
-    result.missing = {at_end.front().effect};
-    result.why = fmt::format("{} would have to be at the end of its range: something else, that looks like it",
-                             at_end.front().ends_at);
-    return result;
-  }
-  if (local >= priors.named_at) {
-    result.verdict = Verdict::unexplained;
-    if (!included.empty()) result.missing = {included.front().effect};
-    result.ambiguous_rest = likely_effects(hypotheses, effects, included,
-                                           [](const Inclusion& one) { return one.bayes_factor >= settling_factor; });
-    result.why = fmt::format("a local cause that the catalogue does not list has probability {:.2f}", local);
-    return result;
-  }
-  const bool some = !included.empty() && included.front().probability > 0 &&
-                    std::any_of(included.begin(), included.end(), [&](const Inclusion& one) {
-                      const bool likelier_than_nothing = priors.is_expected(one.effect) && one.probability > nothing;
-                      return one.bayes_factor >= settling_factor || likelier_than_nothing;
-                    });
-  std::vector<std::string> undecided;
-  for (const Inclusion& one : included)
-    if (is_left_open(priors, one) && std::find(unseen.begin(), unseen.end(), one.effect) != unseen.end())
-      undecided.push_back(one.effect);
-  const bool locally = is_likelier_than_before(local, priors.unlisted);
-  const bool likely = ((some || locally) && nothing < nothing_unlikely) || nothing < nothing_excluded;
-  if (likely && locally && denied.empty() && undecided.empty() && local > probability_of_some_effect(hypotheses)) {
-    result.verdict = Verdict::unexplained;
-    if (!included.empty()) result.missing = {included.front().effect};
-    result.why = fmt::format(
-        "something local that the catalogue does not list has probability {:.2f}, that nothing is missing {:.2f}",
-        local, nothing);
-    return result;
-  }
-  if (likely || !undecided.empty()) {
-    result.verdict = Verdict::ambiguous;
-    const bool expected =
-        std::any_of(included.begin(), included.end(), [&](const Inclusion& one) { return is_left_open(priors, one); });
-    result.missing = likely_effects(hypotheses, effects, included, [&](const Inclusion& one) {
-      return (!some && !expected) || one.bayes_factor >= settling_factor || is_left_open(priors, one);
-    });
-    result.why = denied.empty() ? fmt::format("that nothing is missing has probability {:.2f}", nothing)
-                                : fmt::format("what was left out speaks against {}", fmt::join(denied, ", "));
-    if (!likely) result.why += fmt::format(", and this scan could not show {}", fmt::join(undecided, " or "));
-    return result;
-  }
-  if (unexplained.low_mm > priors.unexplained_bound_mm) {
-    result.verdict = Verdict::unexplained;
-    if (!included.empty()) result.missing = {included.front().effect};
-    result.why = fmt::format("{:.1f} mm [{:.1f}, {:.1f}] are explained by no effect of the catalogue",
-                             unexplained.mean_mm, unexplained.low_mm, unexplained.high_mm);
-    return result;
-  }
-  result.ambiguous_rest =
-      likely_effects(hypotheses, effects, included, [&](const Inclusion& one) { return is_left_open(priors, one); });
-  result.why = fmt::format("probability {:.2f}", nothing);
-  return result;
+  const Odds known(hypotheses, effects, included, unexplained, priors, unseen);
+  for (const auto rule : {missing, at_an_end, surely_local, rather_local, undecided, not_explained})
+    if (auto diagnosis = rule(known)) return *diagnosis;
+  return nothing_missing(known);
 }
 
 }  // namespace supine::diagnosis

@@ -8,6 +8,7 @@
 #include "diagnosis/followed_sets.h"
 #include "diagnosis/look_beside.h"
 #include "diagnosis/next_set.h"
+#include "diagnosis/parts_of_first.h"
 
 namespace supine::diagnosis {
 namespace {

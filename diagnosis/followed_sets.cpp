@@ -91,6 +91,21 @@ void FollowedSets::follow_one(const std::vector<int> effects) {
   weigh();
 }
 
+void FollowedSets::follow_within(const std::vector<int>& whole, const std::vector<int>& part) {
+  const auto from = refit_of(whole), before = refit_of(part);
+  if (from == found.refits.end() || !was_screened(part)) return;
+  Hypothesis& h = hypothesis_of(part);
+  tell("from a larger set, refit with", part);
+  Refit refit = refit_within(subject.scene, subject.given, ground_of(part), *from, found.candidates, h);
+  const bool first = before == found.refits.end();
+  if (!refit.solved || (!first && refit.hypothesis.ln_evidence <= h.ln_evidence)) return;
+  h = refit.hypothesis;
+  if (first)
+    found.refits.push_back(std::move(refit));
+  else
+    *before = std::move(refit);
+}
+
 /// The likeliest refit whose strengths are not settled yet, of those that are likely; the number of refits where
 /// there is none.
 std::size_t FollowedSets::next_to_settle() const {

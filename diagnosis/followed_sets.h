@@ -40,6 +40,8 @@ class FollowedSets {
 
   void weigh();
   void follow_one(std::vector<int> effects);
+  /// A part of a set is followed from where the whole ended; of two fits of it the likelier is kept. Not weighed anew.
+  void follow_within(const std::vector<int>& whole, const std::vector<int>& part);
 
   /// Strengths that are far from linear, of every set that is likely. @return  whether another set is the likeliest
   /// since

@@ -92,47 +92,11 @@ void drop_errors_beside(FollowedSets& sets, int effect) {
   sets.forget_lines_with({effect});
 }
 
-/// A part of a set is followed from where the whole ended; of two fits of it the likelier is kept.
-void follow_within(FollowedSets& sets, const std::vector<int>& whole, const std::vector<int>& part) {
-  const auto from = sets.refit_of(whole), before = sets.refit_of(part);
-  if (from == sets.found.refits.end() || !sets.was_screened(part)) return;
-  Hypothesis& h = sets.hypothesis_of(part);
-  sets.tell("from a larger set, refit with", part);
-  Refit refit =
-      refit_within(sets.subject.scene, sets.subject.given, sets.ground_of(part), *from, sets.found.candidates, h);
-  const bool first = before == sets.found.refits.end();
-  if (!refit.solved || (!first && refit.hypothesis.ln_evidence <= h.ln_evidence)) return;
-  h = refit.hypothesis;
-  if (first)
-    sets.found.refits.push_back(std::move(refit));
-  else
-    *before = std::move(refit);
-}
-
 }  // namespace
 
 void look_beside(FollowedSets& sets) {
   for (std::vector<int> part = surest_part(sets.found); !part.empty(); part = surest_part(sets.found)) {
     if (!look_again_beside(sets, part)) break;
-    sets.settle_strengths();
-  }
-}
-
-void follow_parts_of_first(FollowedSets& sets, std::vector<std::vector<int>>& looked_at) {
-  constexpr double no_matter = 1;  // of ln evidence
-  for (;;) {
-    const std::vector<int> whole = sets.found.hypotheses.front().effects;
-    if (whole.size() < 2 || std::find(looked_at.begin(), looked_at.end(), whole) != looked_at.end()) return;
-    looked_at.push_back(whole);
-    for (const int e : whole) {
-      std::vector<int> part = whole;
-      std::erase(part, e);
-      const bool judged = sets.found.beside.empty() || is_part_of(sets.found.beside.back().effects, part);
-      if (!judged || !sets.was_screened(part)) continue;
-      if (sets.hypothesis_of(whole).ln_evidence - sets.hypothesis_of(part).ln_evidence > no_matter)
-        follow_within(sets, whole, part);
-    }
-    sets.weigh();
     sets.settle_strengths();
   }
 }
@@ -144,7 +108,7 @@ bool do_without_idle(FollowedSets& sets) {
   drop_errors_beside(sets, idle);
   std::vector<int> part = whole;
   std::erase(part, idle);
-  follow_within(sets, whole, part);
+  sets.follow_within(whole, part);
   sets.weigh();
   return true;
 }

@@ -7,6 +7,7 @@
 #include "meshing/topology.h"
 #include "phantom/cause_prior.h"
 #include "phantom/causes/cause_kind.h"
+#include "phantom/solve_poses.h"
 #include "phantom/solve_volunteer.h"
 #include "phantom/voxels.h"
 
@@ -42,17 +43,14 @@ Nuisances draw_nuisances(const PhantomOptions& options, const Phantom& phantom) 
 
 /// Solves; stiffens the body until every pose has an equilibrium.
 void solve_stiffening(const BodyMesh& body_mesh, const PhantomOptions& options, Phantom& phantom) {
-  const Nuisances* nuisances = phantom.nuisances ? &*phantom.nuisances : nullptr;
+  Body body = phantom.body;
   for (int tried = 0;; ++tried) {
     try {
-      Truth truth(body_mesh, phantom.body, phantom.causes, nuisances);
-      truth.solve(phantom.poses);
-      if (options.prior) phantom.discrepancy.emplace(truth, body_mesh, phantom.poses, options.seed);
-      break;
+      return solve_poses(body_mesh, body, options, phantom);
     } catch (const NumericalFailure&) {
       if (tried == stiffer_tries) throw;
-      phantom.body.breast_kpa *= stiffer;
-      phantom.body.skin_kpa *= stiffer;
+      body.breast_kpa *= stiffer;
+      body.skin_kpa *= stiffer;
     }
   }
 }

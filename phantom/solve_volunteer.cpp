@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "phantom/solve_poses.h"
 #include "phantom/volunteers.h"
 
 namespace supine::phantom {
@@ -96,12 +97,7 @@ class Search {
 
   void solve(double factor, Truth::Start start) {
     const Body body = scaled(factor);
-    std::vector<TruthPose> poses = phantom_.poses;
-    Truth truth(body_mesh_, body, phantom_.causes, phantom_.nuisances ? &*phantom_.nuisances : nullptr);
-    truth.solve(poses, start);
-    if (options_.prior) phantom_.discrepancy.emplace(truth, body_mesh_, poses, options_.seed);
-    phantom_.poses = std::move(poses);
-    phantom_.body = body;
+    solve_poses(body_mesh_, body, options_, phantom_, start);
     factor_ = factor;
     moved_ = measure_motion(body_mesh_, body, phantom_.poses[0].x, phantom_.poses[1].x, options_.seed).nipple_mm.norm();
   }

@@ -23,7 +23,6 @@ using Eigen::VectorXd;
 
 constexpr double strength_sd = 4;      // standard deviations of the field: the middle one of what lines are drawn to
 constexpr double out_of_reach = 12;    // of the logarithm: what following may gain
-constexpr double worth_asking = 0.2;   // probability of an effect, or of something local, that may be told
 constexpr double worth_following = 1;  // gain along lines, of the logarithm
 constexpr double likely_beside = 0.5;  // probability of one beside the likeliest effects: may it do without them?
 constexpr double spread_of_length = 0.35;  // of itself
@@ -145,8 +144,8 @@ bool may_decide(const std::vector<Hypothesis>& hypotheses) {
     for (const int effect : h.effects) included[effect] += h.probability;
     for (const double share : h.with_unlisted) unlisted += h.probability * share;
   }
-  return unlisted >= worth_asking ||
-         std::any_of(included.begin(), included.end(), [](const auto& one) { return one.second >= worth_asking; });
+  return unlisted >= worth_telling ||
+         std::any_of(included.begin(), included.end(), [](const auto& one) { return one.second >= worth_telling; });
 }
 
 /// The likeliest of what following from several starts leads to.

@@ -21,6 +21,8 @@ enum class LocalKind { tissue, skin, muscle };
 inline constexpr std::size_t local_kinds = 3;
 /// Standard deviations of a cause's size about nothing, each alike, in those of its field.
 inline constexpr std::array<double, 3> local_cause_sizes{2, 4, 8};
+/// Probability from which a local cause is worth telling: twice what it is before anything is measured, by and large.
+inline constexpr double worth_telling = 0.2;
 /// "tissue", "skin", "muscle".
 std::string local_kind_name(LocalKind kind);
 

@@ -135,7 +135,7 @@ void read_choices(const TomlReader& file, Model& model) {
   read_choice<InterfaceKind>(file.sub_table("interface"), "kind", interface_kinds(), model.interface.kind);
   read_choice<CutKind>(file.sub_table("cut"), "kind", {{"elastic", CutKind::elastic}, {"held", CutKind::held}},
                        model.cut.kind);
-  if (skin) model.skin.fade_mm = skin->number("fade_mm", {.lower = 0, .upper = 50}).value_or(0);
+  if (skin) model.skin.fade_mm = skin->number("fade_mm", {.lower = 0, .upper = longest_skin_fade_mm}).value_or(0);
 }
 
 /// "section" and "key" of a base row.

@@ -9,6 +9,9 @@
 
 namespace supine::pipeline {
 
+/// Upper bound of [skin] fade_mm.
+inline constexpr double longest_skin_fade_mm = 50;
+
 /// What stands in a model.toml, or is to stand there.
 struct ModelText {
   std::filesystem::path file;  ///< what messages name

@@ -90,6 +90,8 @@ class ModelTool : public Tool {
     for (const Parameter& row : simulation::base_parameters())
       run.say(fmt::format("    {:<36}{:<9}range {:>8} to {:<8} {}", row.name, row.unit == "1" ? "" : row.unit,
                           row.lower, row.upper, row.meaning));
+    run.say(fmt::format("    {:<36}{:<9}range {:>8} to {:<8} {}", "skin.fade_mm", "mm", 0, longest_skin_fade_mm,
+                        "length over which skin and cut fade out where the skin ends; fixed"));
     run.say("Effects (at null an effect leaves the model unchanged)");
     for (const simulation::Effect* effect : simulation::catalogue()) {
       run.say(fmt::format("  {}: {}", effect->name(), effect->meaning()));

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "diagnosis/evidence/unlisted.h"
 
 namespace supine::pipeline {
 namespace {
@@ -131,13 +132,19 @@ std::string add_local_cause(const Json& diagnosis, const Places& places) {
                      numbers, places.make("calibrate"));
 }
 
-void tell_unexplained(const Json& diagnosis, const Places& places, const char* body, Answer& answer) {
+void tell_unexplained(const Json& diagnosis, const char* body, Answer& answer) {
   const Json missing = diagnosis.value("missing", Json::array());
   answer.kind = "unexplained";
   answer.sentence = fmt::format("The model is off in a way that no effect of the catalogue explains{}.",
                                 may_be_close(diagnosis, missing) ? "; closest: " + listed(missing, "or") : "");
   answer.next = fmt::format("Look at the map below, check scan and segmentation there, and {}.",
                             next_measurement(diagnosis, body));
+}
+
+/// Where no effect is to be added, the local cause may be.
+void offer_local_cause(const Json& diagnosis, const Places& places, Answer& answer) {
+  const double probability = number(diagnosis.value("unlisted", Json::object()), "probability");
+  if (!answer.command.empty() || !(answer.kind == "unexplained" || probability >= diagnosis::worth_telling)) return;
   answer.command = add_local_cause(diagnosis, places);
   if (!answer.command.empty()) answer.next += " Or put the local cause into the model and see what it leaves.";
 }
@@ -159,8 +166,9 @@ void tell_diagnosis(const Json& diagnosis, const Places& places, const char* bod
                : fmt::format("Something is missing, and this scan cannot tell which: {}.", listed(missing, "or"));
     answer.next = fmt::format("To tell them apart, {}.", next_measurement(diagnosis, body));
   } else {
-    tell_unexplained(diagnosis, places, body, answer);
+    tell_unexplained(diagnosis, body, answer);
   }
+  offer_local_cause(diagnosis, places, answer);
 }
 
 /// "The supine scan lies 2.1 mm and 0.8° from where it was said to lie."
@@ -177,8 +185,7 @@ std::string place_of_scan(const Json& place) {
 /// "Something local that is not listed has probability 0.98: the muscle about (12, -40, 33) mm …"; empty where it is
 /// hardly likelier than it was before.
 std::string unlisted_cause(const Json& unlisted) {
-  constexpr double worth_telling = 0.2;
-  if (!(number(unlisted, "probability") >= worth_telling)) return "";
+  if (!(number(unlisted, "probability") >= diagnosis::worth_telling)) return "";
   const Json &place = unlisted.at("place_mm"), &reach = unlisted.at("interval95");
   const bool moved = unlisted.contains("moved_mm");
   const double size = number(unlisted, moved ? "moved_mm" : "times_as_stiff");

@@ -71,7 +71,6 @@ void say_unexpected(const Run& run, const Findings& found) {
 }
 
 constexpr double worth_naming = 0.01;
-constexpr double worth_telling = 0.2;  // of a local cause: twice what it was before
 
 void say_hypotheses(const Run& run, const Findings& found) {
   constexpr double worth_a_line = 0.01;
@@ -80,7 +79,7 @@ void say_hypotheses(const Run& run, const Findings& found) {
     std::vector<std::string> names;
     for (const int effect : one->effects) names.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);
     const Refit* refit = names.empty() ? nullptr : found.refit_of(names);
-    const char* none = found.unlisted.probability < worth_telling ? "nothing missing" : "nothing that is listed";
+    const char* none = found.unlisted.probability < diagnosis::worth_telling ? "nothing missing" : "nothing that is listed";
     run.say(fmt::format("  {:<34}{:>6.2f}      unexplained {:.1f} mm [{:.1f}, {:.1f}]     {}",
                         names.empty() ? none : joined(names, " + "), one->probability, left.mean_mm, left.low_mm,
                         left.high_mm, refit ? values_of(refit->parameters) : ""));
@@ -90,7 +89,7 @@ void say_hypotheses(const Run& run, const Findings& found) {
 /// Whether a local cause that no effect lists is likelier than it was before, and where.
 void say_unlisted(const Run& run, const Findings& found) {
   const diagnosis::Unlisted& u = found.unlisted;
-  if (u.probability < worth_telling) return;
+  if (u.probability < diagnosis::worth_telling) return;
   const std::string place = fmt::format("about ({:.0f}, {:.0f}, {:.0f}) mm (to {:.0f} mm)", u.place_mm.x(),
                                         u.place_mm.y(), u.place_mm.z(), std::max(1.0, u.within_mm));
   const std::string size = u.kind == diagnosis::LocalKind::muscle
@@ -239,7 +238,8 @@ void say_limits(const Run& run, const DiagnosisResult& result) {
         found.budget.numerical, result.finer_triangles));
   if (found.diagnosis.verdict == Verdict::missing)
     run.say(fmt::format("  add it:   supine-model add {} model.toml && make CASE=... calibrate", set[0]));
-  if (found.diagnosis.verdict == Verdict::unexplained && found.unlisted.effect)
+  if (found.unlisted.effect && (found.diagnosis.verdict == Verdict::unexplained ||
+                                found.unlisted.probability >= diagnosis::worth_telling))
     say_how_to_add(run, *found.unlisted.effect);
 }
 

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "diagnosis/look_beside.h"
+#include "diagnosis/parts_of_first.h"
 #include "diagnosis/range_ends.h"
 #include "tests/diagnosis/twin_findings.h"
 

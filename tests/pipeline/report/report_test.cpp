@@ -349,6 +349,15 @@ TEST(ReportAnswer, SaysWhereSomethingLocalIsThatNoEffectLists) {
             "build/bin/supine-model add local_stiffness mycase/model.toml --with log_ratio=1.36 --with of=tissue && "
             "make CASE=mycase calibrate");
   expect_words(answer().next, {"put the local cause into the model"});
+  const auto command_of = [](const char* verdict, const Json& found) {
+    return answered({{"verdict", verdict}, {"missing", {"creep"}}, {"unlisted", found}}).command;
+  };
+  Json possible = unlisted;
+  possible["probability"] = 0.4;
+  expect_words(command_of("ambiguous", possible), {"add local_stiffness"});
+  expect_words(command_of("missing", possible), {"add creep"});
+  possible["probability"] = 0.1;
+  EXPECT_EQ(command_of("ambiguous", possible), "") << "as likely as it was before";
   unlisted.erase("times_as_stiff");
   unlisted["likeliest"] = "muscle", unlisted["moved_mm"] = -4.2, unlisted["interval95"] = {-6.1, -2.3};
   expect_words(facts(), {"muscle about (12, -40, 33) mm lies 4.2 mm deeper (95 %: 2.3 to 6.1)"});

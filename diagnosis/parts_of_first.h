@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: AGPL-3.0-or-later
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/followed_sets.h"
+
+namespace supine::diagnosis {
+
+/// What is simpler by one effect than the likeliest set is followed once more from where that ended, where it came out
+/// worse: it may have ended elsewhere because it began elsewhere, and the effect would be named for what any further
+/// steps do. Again, as long as another set of two or more is the likeliest then.
+/// @param looked_at  sets of which this was done
+void follow_parts_of_first(FollowedSets& sets, std::vector<std::vector<int>>& looked_at);
+
+}  // namespace supine::diagnosis
