@@ -15,6 +15,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "bench"))
 import hidden  # noqa: E402
 import hidden_case  # noqa: E402
 import hidden_plan  # noqa: E402
+import hidden_pooled  # noqa: E402
 import hidden_probability  # noqa: E402
 import hidden_rates  # noqa: E402
 import hidden_score  # noqa: E402
@@ -123,6 +124,15 @@ class Scored(unittest.TestCase):
             hidden_score.write(hidden_score.scored_before([self.root / f"{part}.jsonl" for part in parts]), self.root / name)
         for end in ("md", "csv", "json", "jsonl"):
             self.assertEqual((self.root / f"merged.{end}").read_bytes(), (self.root / f"whole.{end}").read_bytes(), end)
+
+    def test_pooled_line(self):
+        line = dict(enumerate(hidden_pooled.line_of(self.cases)))
+        total, causes, nulls = line[0], [line[i] for i in range(1, 8)], [line[i] for i in range(8, 13)]
+        self.assertEqual(total, len(CASES))
+        # Of eleven with a cause: right, in the set, a wrong name, a wrong set, no name, no answer.
+        self.assertEqual(causes, [11, 3, 1, 3, 1, 2, 1])
+        self.assertEqual(nulls, [3, 1, 0, 2, 0])
+        self.assertEqual(len(line), len(hidden_pooled.COLUMNS))
 
     def test_unknown_verdict_is_refused(self):
         (self.root / "out" / "case-000" / "diagnosis.json").write_text('{"verdict": "perhaps", "missing": []}')
