@@ -131,7 +131,8 @@ using Rule = std::optional<Diagnosis>;
 
 Rule missing(const Odds& known) {
   if (known.sure.empty()) return {};
-  Diagnosis result{Verdict::missing};
+  Diagnosis result;
+  result.verdict = Verdict::missing;
   for (const Inclusion* one : known.sure) result.missing.push_back(one->effect);
   result.ambiguous_rest = known.likely([&known](const Inclusion& one) {
     return (one.probability < known.priors.named_at || !one.ends_at.empty()) &&
@@ -175,7 +176,8 @@ Rule rather_local(const Odds& known) {
 Rule undecided(const Odds& known) {
   const bool likely = known.something_is_likely();
   if (!likely && known.unsettled.empty()) return {};
-  Diagnosis result{Verdict::ambiguous};
+  Diagnosis result;
+  result.verdict = Verdict::ambiguous;
   const bool any = !known.effect_is_likelier && !known.expected_is_open;
   result.missing = known.likely([&](const Inclusion& one) {
     return any || one.bayes_factor >= settling_factor || is_left_open(known.priors, one);

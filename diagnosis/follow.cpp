@@ -178,6 +178,7 @@ void follow(const Subject& subject, const ExamineOptions& options, Findings& fou
       look_beside(sets);
     }
     follow_parts_of_first(sets, looked_at);
+    follow_nothing_again(sets);
   }
   const auto rank = [&found](const Refit& refit) {
     for (const Hypothesis& h : found.hypotheses)

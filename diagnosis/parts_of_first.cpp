@@ -26,4 +26,23 @@ void follow_parts_of_first(FollowedSets& sets, std::vector<std::vector<int>>& lo
   }
 }
 
+void follow_nothing_again(FollowedSets& sets) {
+  constexpr double no_matter = 1, out_of_the_question = 0.01;  // of ln evidence; probability
+  Hypothesis& nothing = sets.hypothesis_of({});
+  if (nothing.probability < out_of_the_question) return;
+  const Refit* best = nullptr;
+  for (const Refit& refit : sets.found.refits) {
+    const Hypothesis& h = refit.hypothesis;
+    if (!refit.solved || h.effects.size() != 1 || h.ground != nothing.ground) continue;
+    if (best == nullptr || h.ln_evidence > best->hypothesis.ln_evidence) best = &refit;
+  }
+  if (best == nullptr || best->hypothesis.ln_evidence - nothing.ln_evidence < no_matter) return;
+  sets.tell("from an effect, nothing again: without", best->hypothesis.effects);
+  const Refit again = refit_within(sets.subject.scene, sets.subject.given, sets.found.base, *best,
+                                   sets.found.candidates, nothing);
+  if (!again.solved || again.hypothesis.ln_evidence <= nothing.ln_evidence) return;
+  nothing = again.hypothesis;
+  sets.weigh();
+}
+
 }  // namespace supine::diagnosis

@@ -120,7 +120,7 @@ def panel(window, column, title, actors, lookup=None):
     camera.SetPosition(-140, -150, -420)
     camera.SetViewUp(0, -1, 0)
     camera.ParallelProjectionOn()
-    camera.SetParallelScale(92)
+    camera.SetParallelScale(104)
     view.ResetCameraClippingRange()
     window.AddRenderer(view)
 
