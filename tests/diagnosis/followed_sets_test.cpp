@@ -148,6 +148,42 @@ TEST_F(HillAndIdle, APartThatEndedElsewhereIsFollowedFromTheWhole) {
   EXPECT_EQ(std::count_if(found->refits.begin(), found->refits.end(), is_of_hill), 1) << "of two fits one is kept";
 }
 
+TEST(Follow, NothingIsFollowedAgainFromWhereALikelyEffectEnded) {
+  const Twin twin({supine::testing::twin_truth(), twin_noise_mm});
+  const Subject subject = subject_of(twin);
+  const auto found = findings_of(subject, 0);
+  std::vector<std::string> told;
+  ExamineOptions options = twin_options(5);
+  options.progress = [&told](const std::string& what) { told.push_back(what); };
+  FollowedSets sets(subject, options, *found);
+  sets.follow_one({row_of(*found, "adhesion")});
+  told.clear();
+  follow_nothing_again(sets);
+  EXPECT_TRUE(told.empty()) << "it came out better";
+  const double well = sets.hypothesis_of({}).ln_evidence, likely = sets.hypothesis_of({}).probability;
+  constexpr double elsewhere = 3;
+  sets.hypothesis_of({}).ln_evidence -= elsewhere;
+  sets.weigh();
+  ASSERT_LT(sets.hypothesis_of({}).probability, likely);
+  follow_nothing_again(sets);
+  EXPECT_EQ(told, std::vector<std::string>{"from an effect, nothing again: without adhesion"});
+  EXPECT_NEAR(sets.hypothesis_of({}).ln_evidence, well, 0.5);
+  EXPECT_NEAR(sets.hypothesis_of({}).probability, likely, 0.05);
+  EXPECT_EQ(found->refits.size(), 1u) << "nothing is no refit";
+}
+
+TEST(Follow, NothingIsNotAskedAgainWhereItIsOutOfTheQuestion) {
+  const Twin twin({twin_with("chest_wall_motion", "amplitude_mm", 6), twin_noise_mm});
+  const Subject subject = subject_of(twin);
+  const auto found = findings_of(subject, 0);
+  const ExamineOptions options = twin_options(5);
+  FollowedSets sets(subject, options, *found);
+  sets.follow_one({row_of(*found, "chest_wall_motion")});
+  const double before = sets.hypothesis_of({}).ln_evidence;
+  follow_nothing_again(sets);
+  EXPECT_EQ(sets.hypothesis_of({}).ln_evidence, before);
+}
+
 TEST(Follow, AScanThatLiesFarOffIsPutInItsPlaceFirst) {
   const Twin twin({supine::testing::twin_truth(), twin_noise_mm});
   const auto first_told = [&twin](const Eigen::RowVector3d& shift_mm) {
