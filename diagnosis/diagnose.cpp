@@ -83,18 +83,15 @@ std::vector<std::string> likely_effects(const std::vector<Hypothesis>& hypothese
 /// What the verdict rests on.
 struct Odds {
   Odds(const std::vector<Hypothesis>& sets, const std::vector<std::string>& names,
-           const std::vector<Inclusion>& inclusion_of, const Unexplained& rest, const Priors& beliefs,
-           const std::vector<std::string>& unseen)
+       const std::vector<Inclusion>& inclusion_of, const Unexplained& rest, const Priors& beliefs,
+       const std::vector<std::string>& unseen)
       : hypotheses(sets), effects(names), included(inclusion_of), unexplained(rest), priors(beliefs) {
     nothing = probability_of_nothing(sets);
     local = probability_of_unlisted(sets);
     local_is_likelier = is_likelier_than_before(local, beliefs.unlisted);
     for (const Inclusion& one : included) {
       if (one.probability >= priors.named_at)
-        (!one.ends_at.empty()                    ? at_end
-         : one.left_out_gain > speaks_against    ? sure
-                                                 : denied)
-            .push_back(&one);
+        (!one.ends_at.empty() ? at_end : one.left_out_gain > speaks_against ? sure : denied).push_back(&one);
       if (is_left_open(priors, one)) expected_is_open = true;
       if (is_left_open(priors, one) && std::find(unseen.begin(), unseen.end(), one.effect) != unseen.end())
         unsettled.push_back(one.effect);
@@ -154,10 +151,9 @@ Rule at_an_end(const Odds& known) {
 
 Rule surely_local(const Odds& known) {
   if (known.local < known.priors.named_at) return {};
-  return Diagnosis{
-      Verdict::unexplained, known.best(),
-      known.likely([](const Inclusion& one) { return one.bayes_factor >= settling_factor; }),
-      fmt::format("a local cause that the catalogue does not list has probability {:.2f}", known.local)};
+  return Diagnosis{Verdict::unexplained, known.best(),
+                   known.likely([](const Inclusion& one) { return one.bayes_factor >= settling_factor; }),
+                   fmt::format("a local cause that the catalogue does not list has probability {:.2f}", known.local)};
 }
 
 Rule rather_local(const Odds& known) {

@@ -38,8 +38,8 @@ void follow_nothing_again(FollowedSets& sets) {
   }
   if (best == nullptr || best->hypothesis.ln_evidence - nothing.ln_evidence < no_matter) return;
   sets.tell("from an effect, nothing again: without", best->hypothesis.effects);
-  const Refit again = refit_within(sets.subject.scene, sets.subject.given, sets.found.base, *best,
-                                   sets.found.candidates, nothing);
+  const Refit again =
+      refit_within(sets.subject.scene, sets.subject.given, sets.found.base, *best, sets.found.candidates, nothing);
   if (!again.solved || again.hypothesis.ln_evidence <= nothing.ln_evidence) return;
   nothing = again.hypothesis;
   sets.weigh();

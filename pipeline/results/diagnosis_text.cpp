@@ -79,7 +79,8 @@ void say_hypotheses(const Run& run, const Findings& found) {
     std::vector<std::string> names;
     for (const int effect : one->effects) names.push_back(found.candidates[static_cast<std::size_t>(effect)].effect);
     const Refit* refit = names.empty() ? nullptr : found.refit_of(names);
-    const char* none = found.unlisted.probability < diagnosis::worth_telling ? "nothing missing" : "nothing that is listed";
+    const char* none =
+        found.unlisted.probability < diagnosis::worth_telling ? "nothing missing" : "nothing that is listed";
     run.say(fmt::format("  {:<34}{:>6.2f}      unexplained {:.1f} mm [{:.1f}, {:.1f}]     {}",
                         names.empty() ? none : joined(names, " + "), one->probability, left.mean_mm, left.low_mm,
                         left.high_mm, refit ? values_of(refit->parameters) : ""));
@@ -238,8 +239,8 @@ void say_limits(const Run& run, const DiagnosisResult& result) {
         found.budget.numerical, result.finer_triangles));
   if (found.diagnosis.verdict == Verdict::missing)
     run.say(fmt::format("  add it:   supine-model add {} model.toml && make CASE=... calibrate", set[0]));
-  if (found.unlisted.effect && (found.diagnosis.verdict == Verdict::unexplained ||
-                                found.unlisted.probability >= diagnosis::worth_telling))
+  if (found.unlisted.effect &&
+      (found.diagnosis.verdict == Verdict::unexplained || found.unlisted.probability >= diagnosis::worth_telling))
     say_how_to_add(run, *found.unlisted.effect);
 }
 
