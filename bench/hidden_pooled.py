@@ -13,9 +13,9 @@ from hidden_probability import constant_score, log_score, statements
 from hidden_rates import count, held, is_outcome, rate
 from hidden_score import by_set, scored_before
 
-COLUMNS = ("cases", "with a cause", "named, rightly", "in the set", "wrong name", "wrong set", "no name", "no answer",
-           "without one", "wrong name", "wrong set", "no name", "no answer", "places held, %", "log score (mean shares)",
-           "seconds")
+COLUMNS = ("cases", "**with a cause**", "named, rightly", "in the set", "wrong name", "wrong set", "no name",
+           "no answer", "**without**", "wrong name", "wrong set", "no name", "no answer", "places held, %",
+           "log score (mean shares)", "seconds")
 
 
 def of_causes(cases):
