@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """One line for each group of rows that bench/hidden.py wrote: what was named, rightly and wrongly, and what held.
 
-    bench/hidden_pooled.py --group "from the priors" docs/hidden-evidence-1[234].jsonl [--group NAME ROWS.jsonl ...]
+    bench/hidden_pooled.py --group "from the priors" docs/hidden-evidence-1[2345].jsonl [--group NAME ROWS.jsonl ...]
 """
 
 import argparse
@@ -49,10 +49,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--group", nargs="+", action="append", required=True, metavar=("NAME", "ROWS.jsonl"),
                         help="a name, and files of rows")
-    print("| | " + " | ".join(COLUMNS) + " |\n|" + "---|" * (len(COLUMNS) + 1))
-    for name, *files in parser.parse_args().group:
+    groups = parser.parse_args().group
+    for name, *files in groups:
         if not files:
             parser.error(f"--group {name}: no file of rows")
+    print("| | " + " | ".join(COLUMNS) + " |\n|" + "---|" * (len(COLUMNS) + 1))
+    for name, *files in groups:
         sets = by_set(scored_before([pathlib.Path(file) for file in files]))
         for kind, cases in sets.items():
             label = name if len(sets) == 1 else f"{name}, {kind}"

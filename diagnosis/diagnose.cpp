@@ -90,14 +90,19 @@ struct Odds {
     local = probability_of_unlisted(sets);
     local_is_likelier = is_likelier_than_before(local, beliefs.unlisted);
     for (const Inclusion& one : included) {
-      if (one.probability >= priors.named_at)
-        (!one.ends_at.empty() ? at_end : one.left_out_gain > speaks_against ? sure : denied).push_back(&one);
-      if (is_left_open(priors, one)) expected_is_open = true;
-      if (is_left_open(priors, one) && std::find(unseen.begin(), unseen.end(), one.effect) != unseen.end())
-        unsettled.push_back(one.effect);
+      if (one.probability >= priors.named_at) likely_enough(one).push_back(&one);
+      const bool open = is_left_open(priors, one);
+      expected_is_open = expected_is_open || open;
+      if (open && std::find(unseen.begin(), unseen.end(), one.effect) != unseen.end()) unsettled.push_back(one.effect);
       effect_is_likelier = effect_is_likelier || one.bayes_factor >= settling_factor ||
                            (priors.is_expected(one.effect) && one.probability > nothing);
     }
+  }
+
+  /// The list of what would be named that an effect belongs to.
+  std::vector<const Inclusion*>& likely_enough(const Inclusion& one) {
+    if (!one.ends_at.empty()) return at_end;
+    return one.left_out_gain > speaks_against ? sure : denied;
   }
 
   /// Something is likelier than it was, and that nothing is missing is not.

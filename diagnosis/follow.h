@@ -21,7 +21,8 @@ namespace supine::diagnosis {
 ///
 /// An effect may have stood for something that was found beside it since: then its strength ends where it does nothing,
 /// yet no set without it was ever fitted as well. Its set is followed without it from where the whole ended, and all is
-/// weighed under errors that were not measured beside it.
+/// weighed under errors that were not measured beside it. What is simpler than the likeliest set, and nothing beside
+/// the likeliest effect, are followed again from where that ended (parts_of_first.h).
 void follow(const Subject& subject, const ExamineOptions& options, Findings& found);
 
 }  // namespace supine::diagnosis

@@ -134,6 +134,12 @@ class Scored(unittest.TestCase):
         self.assertEqual(nulls, [3, 1, 0, 2, 0])
         self.assertEqual(len(line), len(hidden_pooled.COLUMNS))
 
+    def test_a_group_without_rows_is_refused(self):
+        script = pathlib.Path(hidden_pooled.__file__)
+        refused = subprocess.run([sys.executable, script, "--group", "pairs"], capture_output=True, text=True, check=False)
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("--group pairs: no file of rows", refused.stderr)
+
     def test_unknown_verdict_is_refused(self):
         (self.root / "out" / "case-000" / "diagnosis.json").write_text('{"verdict": "perhaps", "missing": []}')
         with self.assertRaisesRegex(SystemExit, "perhaps"):
