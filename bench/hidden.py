@@ -4,13 +4,14 @@
 
     bench/hidden.py WORK --bin build/bin [--realistic | --prior | --set pairs|foreign|doses [--realistic]]
                     [--cases N] [--seed N | --seed-from TAG] [--quarter 1..4] [--rows FILE] [--first 1] [--jobs 2]
-                    [--registration-mm MM] [--no-tilt] [--only odd|even] [--again [--label LABEL]]
+                    [--registration-mm MM] [--no-tilt] [--only odd|even] [--again [--label LABEL] [--without WHAT]]
 
 WORK/cases/case-001 ... what the tools read; WORK/answers/case-001.json the answers; WORK/out/case-001 what the tools
 wrote. What is scored of a case is a row of WORK/rows.jsonl (--rows), written as soon as the case is done. A call goes
 on from the rows that are there, so that the file alone takes a run to another machine. --again diagnoses the cases that
 are there once more into WORK/out-LABEL (--label LABEL), with mesh and calibration as they are; with --no-tilt from
-WORK/cases-no-tilt, the same cases without their tilted scan. Standard library only.
+WORK/cases-no-tilt, the same cases without their tilted scan; with --without as if there were none of WHAT
+(supine-diagnose --without). Standard library only.
 """
 
 import argparse
@@ -96,14 +97,14 @@ def without_tilt(work, name):
     return case
 
 
-def diagnose_again(work, binaries, name, label, tilt=True):
+def diagnose_again(work, binaries, name, label, tilt=True, without=None):
     source, out = work / "out" / name, work / f"out-{label}" / name
     if not (source / "model.toml").exists() or (out / "diagnosis.json").exists() or (out / "failed").exists():
         return
     out.mkdir(parents=True, exist_ok=True)
     case = work / "cases" / name if tilt else without_tilt(work, name)
     code, seconds = run([binaries / "supine-diagnose", case, source / "mesh.vtu", "--model", source / "model.toml",
-                         "-o", out, "--threads", "1", "--force"],
+                         "-o", out, "--threads", "1", "--force", *(["--without", without] if without else [])],
                         work / "logs" / f"{name}.{label}.txt")
     note_seconds(out, {"diagnose": seconds})
     if code == 0 or code == 1:
@@ -116,7 +117,7 @@ def one_case(work, options, name, words):
     """The row of the case, or None where there is no result."""
     out = work / (f"out-{options.label}" if options.again else "out")
     if options.again:
-        diagnose_again(work, options.bin, name, options.label, not options.no_tilt)
+        diagnose_again(work, options.bin, name, options.label, not options.no_tilt, options.without)
     else:
         words = words + ([] if options.no_tilt else ["--tilt"])
         made, seconds = make_case(work, options.bin, name, words)
@@ -186,6 +187,7 @@ def parser():
     parser.add_argument("--only", choices=["odd", "even"], help="cases with such a seed")
     parser.add_argument("--again", action="store_true", help="diagnose once more, into WORK/out-LABEL")
     parser.add_argument("--label", default="again")
+    parser.add_argument("--without", metavar="WHAT", help="with --again: supine-diagnose --without WHAT")
     return parser
 
 
@@ -197,6 +199,7 @@ def arguments(words=None):
                        (options.seed is not None and options.seed_from, "--seed excludes --seed-from"),
                        (options.registration_mm is not None and options.again,
                         "--registration-mm excludes --again: the cases are there and say what they say"),
+                       (options.without and not options.again, "--without needs --again: cases are diagnosed whole first"),
                        (options.first < 1, f"--first {options.first}: cases are counted from 1")):
         if both:
             raise SystemExit(what)
@@ -221,6 +224,8 @@ def run_all(work, options, rows, cases):
     stamp = {"set": options.name, **program(options.bin)}
     if options.registration_mm is not None:
         stamp["registration_mm"] = options.registration_mm
+    if options.without:
+        stamp["without"] = options.without
     empty = []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         waiting = {pool.submit(one_case, work, options, name, words): name for name, words in cases}

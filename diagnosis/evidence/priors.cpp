@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace supine::diagnosis {
 namespace {
@@ -17,6 +18,8 @@ std::size_t count_expected(const Priors& priors, const std::vector<std::string>&
   return static_cast<std::size_t>(std::count_if(
       effects.begin(), effects.end(), [&priors](const std::string& effect) { return priors.is_expected(effect); }));
 }
+
+constexpr simulation::MeasurementTolerances exact{0, 0, 0, 0, 0, 0, 0, 0};
 
 }  // namespace
 
@@ -53,6 +56,25 @@ double Priors::scan_shared_in(const std::string& pose) const {
 std::optional<double> Priors::independent_points_in(const std::string& pose) const {
   const auto own = of_pose.find(pose);
   return own == of_pose.end() ? std::nullopt : own->second.independent_points;
+}
+
+Priors without(Allowance what, Priors priors) {
+  constexpr double next_to_nothing_mm = std::numeric_limits<double>::min();
+  switch (what) {
+    case Allowance::discrepancy:
+      priors.least_unexplained_mm = next_to_nothing_mm;
+      priors.share_of_way = 0;
+      break;
+    case Allowance::nuisances:
+      priors.known = exact;
+      for (auto& [pose, own] : priors.of_pose) own.known = exact;
+      break;
+    case Allowance::patchiness:
+      priors.patchiness.tissue = priors.patchiness.skin = priors.patchiness.muscle_mm = 0;
+      priors.unlisted = 0;
+      break;
+  }
+  return priors;
 }
 
 double StrengthPrior::mean() const { return log_normal ? median * std::exp(0.5 * spread * spread) : median; }

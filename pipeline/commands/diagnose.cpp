@@ -64,6 +64,12 @@ class DiagnoseTool : public Tool {
            "a way that no effect lists; 0 = that is not weighed")
         ->check(within(0, 0.9))
         ->capture_default_str();
+    app.add_option("--without", options_.without,
+                   "to see what a verdict rests on: examine as if there were no discrepancy (forces that nobody knows "
+                   "of), nuisances (places of scans, gravity, breath, ...), patchiness (uneven tissue, skin and muscle, "
+                   "local causes) or landmarks; several with commas between them")
+        ->delimiter(',')
+        ->check(CLI::IsMember({"discrepancy", "nuisances", "patchiness", "landmarks"}));
     app.add_flag("--ladder", ladder_,
                  "add what is missing, fit and examine again, until nothing is missing or three effects were added; "
                  "writes ladder.json and model.toml, the model as given with what was added and the fitted numbers");
@@ -77,7 +83,8 @@ class DiagnoseTool : public Tool {
     options_.check();
     check_model_target(run);
     announce_png(run, png_, folder() / "diagnosis.vtp");
-    const CaseToDiagnose subject = measure_to_diagnose(run, read_case_inputs(run, case_folder_, mesh_file_, model()));
+    const CaseToDiagnose subject = measure_to_diagnose(
+        run, read_case_inputs(run, case_folder_, mesh_file_, model()), options_.without);
     const MeasuredCase& measured = *subject.measured;
     LiveProgress live(run, std::chrono::seconds(0));
     const diagnosis::ExamineOptions options = examine_options(subject, options_, live);

@@ -20,6 +20,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+const std::pair<std::string, diagnosis::Allowance> allowances[] = {
+    {"discrepancy", diagnosis::Allowance::discrepancy},
+    {"nuisances", diagnosis::Allowance::nuisances},
+    {"patchiness", diagnosis::Allowance::patchiness}};
+
 void warn_of_missing_mesh(Run& run, const diagnosis::NumericalError& error) {
   if (error.finer_failure.empty() && error.coarser_failure.empty()) return;
   const bool both = error.finer_failure == error.coarser_failure;
@@ -105,6 +110,11 @@ void DiagnoseOptions::check() const {
       throw InputError(fmt::format("{} = {}: must be 0 or more, mm", name, *value));
   if (!(unlisted >= 0 && unlisted <= 0.9))
     throw InputError(fmt::format("unlisted = {}: must be a probability from 0 to 0.9", unlisted));
+  for (const std::string& name : without)
+    if (name != "landmarks" && std::none_of(std::begin(allowances), std::end(allowances),
+                                            [&name](const auto& one) { return one.first == name; }))
+      throw InputError(
+          fmt::format("without = {}: must be discrepancy, nuisances, patchiness or landmarks", name));
   if (prior_of_sets.size() != 0 && prior_of_sets.size() != 4)
     throw InputError(fmt::format("--prior {}: must be four numbers, of nothing, one, two and three effects",
                                  fmt::join(prior_of_sets, ",")));
@@ -118,7 +128,12 @@ void DiagnoseOptions::check() const {
         fmt::join(prior_of_sets, ","), sum));
 }
 
-CaseToDiagnose measure_to_diagnose(Run& run, CaseInputs inputs) {
+CaseToDiagnose measure_to_diagnose(Run& run, CaseInputs inputs, const std::vector<std::string>& without) {
+  if (std::find(without.begin(), without.end(), "landmarks") != without.end())
+    inputs.description.prone_landmarks.reset();
+  if (!without.empty())
+    run.warn(fmt::format("examined as if there were no {}: what it says is not what is believed of this patient",
+                         fmt::join(without, " and no ")));
   CaseToDiagnose subject{measure_with_either_model(run, std::move(inputs)), {}, {}, {}};
   const MeasuredCase& measured = *subject.measured;
   calibration::Evaluator evaluator(measured.whole_scene(), measured.model);
@@ -139,6 +154,9 @@ diagnosis::ExamineOptions examine_options(const CaseToDiagnose& subject, const D
   options.priors.unlisted = asked.unlisted;
   if (!asked.prior_of_sets.empty())
     std::copy(asked.prior_of_sets.begin(), asked.prior_of_sets.end(), options.priors.of_sets.begin());
+  for (const auto& [name, what] : allowances)
+    if (std::find(asked.without.begin(), asked.without.end(), name) != asked.without.end())
+      options.priors = without(what, options.priors);
   options.progress = [&live](const std::string& what) { live.show(what); };
   return options;
 }

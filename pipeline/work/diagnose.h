@@ -19,6 +19,8 @@ struct DiagnoseOptions {
   KnownOptions known = {};
   double unlisted = 0.1;                   ///< Priors::unlisted
   std::vector<double> prior_of_sets = {};  ///< of nothing, one, two and three effects; empty = the defaults
+  /// Of discrepancy, nuisances, patchiness and landmarks: what the examination does as if there were none.
+  std::vector<std::string> without = {};
 
   /// @throws InputError  naming the option, its value and the bound
   void check() const;
@@ -36,9 +38,10 @@ struct CaseToDiagnose {
 
 /// Measures the case with the calibrated model, or where that carries the body no more, as a fit to a scan out of place
 /// may end, with the case's own.
-/// @param inputs  with the calibrated model
+/// @param inputs   with the calibrated model
+/// @param without  DiagnoseOptions::without; landmarks named there are not read
 /// @throws InputError, NumericalFailure  as measure_case()
-CaseToDiagnose measure_to_diagnose(Run& run, CaseInputs inputs);
+CaseToDiagnose measure_to_diagnose(Run& run, CaseInputs inputs, const std::vector<std::string>& without = {});
 
 /// What the examination takes; its progress goes to @p live.
 diagnosis::ExamineOptions examine_options(const CaseToDiagnose& subject, const DiagnoseOptions& options,

@@ -26,7 +26,7 @@ std::unique_ptr<Diagnosis> diagnose(const pipeline::Case& description, const Mes
   EngineRun engine("diagnose", std::move(progress));
   auto made = engine.call([&](pipeline::Run& run) {
     auto diagnosis = std::make_unique<Diagnosis>();
-    diagnosis->subject = pipeline::measure_to_diagnose(run, inputs_of(description, mesh, model));
+    diagnosis->subject = pipeline::measure_to_diagnose(run, inputs_of(description, mesh, model), options.without);
     pipeline::LiveProgress live(run, std::chrono::seconds(0));
     diagnosis->result =
         pipeline::diagnose(run, diagnosis->subject, pipeline::examine_options(diagnosis->subject, options, live), live);
@@ -69,20 +69,24 @@ void bind_diagnosis(py::module_& module) {
       "diagnose",
       [](const pipeline::Case& description, const Mesh& mesh, const Model& model, int refits, bool other_meshes,
          unsigned seed, std::optional<double> registration_mm, std::optional<double> segmentation_mm,
-         std::optional<double> chest_wall_mm, std::vector<double> prior, double unlisted, py::object progress) {
+         std::optional<double> chest_wall_mm, std::vector<double> prior, double unlisted,
+         std::vector<std::string> without, py::object progress) {
         return diagnose(
             description, mesh, model,
-            {refits, other_meshes, seed, {registration_mm, segmentation_mm, chest_wall_mm}, unlisted, std::move(prior)},
+            {refits, other_meshes, seed, {registration_mm, segmentation_mm, chest_wall_mm}, unlisted, std::move(prior),
+             std::move(without)},
             std::move(progress));
       },
       py::arg("case"), py::arg("mesh"), py::arg("model"), py::kw_only(), py::arg("refits") = 5,
       py::arg("other_meshes") = true, py::arg("seed") = 1, py::arg("registration_mm") = py::none(),
       py::arg("segmentation_mm") = py::none(), py::arg("chest_wall_mm") = py::none(),
-      py::arg("prior") = std::vector<double>(), py::arg("unlisted") = 0.1, py::arg("progress") = py::none(),
+      py::arg("prior") = std::vector<double>(), py::arg("unlisted") = 0.1,
+      py::arg("without") = std::vector<std::string>(), py::arg("progress") = py::none(),
       "Asks what a calibrated model lacks, as supine-diagnose does. Priors stand in the case's own model.toml where it "
       "has the same free numbers.\n\n"
       "registration_mm, segmentation_mm, chest_wall_mm: 1 sigma. prior: probabilities of nothing, one, two and three "
-      "effects. unlisted: that of a local cause that no effect lists.");
+      "effects. unlisted: that of a local cause that no effect lists. without: of discrepancy, nuisances, patchiness "
+      "and landmarks, what is examined as if there were none.");
 }
 
 }  // namespace supine::python

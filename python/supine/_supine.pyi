@@ -183,6 +183,7 @@ class Diagnosis:
 def diagnose(case: Case, mesh: Mesh, model: Model, *, refits: int = 5, other_meshes: bool = True, seed: int = 1,
              registration_mm: float | None = None, segmentation_mm: float | None = None,
              chest_wall_mm: float | None = None, prior: Sequence[float] = (), unlisted: float = 0.1,
+             without: Sequence[str] = (),
              progress: _Progress = None) -> Diagnosis: ...
 
 class Parameter:

@@ -112,6 +112,38 @@ TEST_F(DiagnoseTool, HoldsWhatIsBelievedOfTheNumberOfEffects) {
   EXPECT_GT(sure, usual);
 }
 
+/// What it says of the same case when something is left out.
+struct Without {
+  Json json;
+  double budget(const std::string& part) const { return json.at("budget_mm").at(part); }
+};
+
+TEST_F(DiagnoseTool, ExaminesAsIfThereWereNoneOfWhatIsLeftOut) {
+  const auto without = [this](const std::string& what) {
+    const Finished finished = diagnose({"--no-other-meshes", "--force", "--without", what});
+    EXPECT_EQ(finished.code, 0) << finished.err;
+    EXPECT_NE(finished.err.find("as if there were no " + what), std::string::npos) << finished.err;
+    return Without{Json::parse(read_text(found_ / "diagnosis.json"))};
+  };
+  EXPECT_LT(without("discrepancy").json.at("unexplained95")[1].get<double>(), 0.1);
+  const Without placed = without("nuisances");
+  for (const Json& place : placed.json.at("registration"))
+    for (const Json& sd : place.at("sd")) EXPECT_EQ(sd.get<double>(), 0);
+  EXPECT_EQ(placed.budget("registration"), 0);
+  EXPECT_GT(placed.budget("patchiness"), 0);
+  const Without even = without("patchiness");
+  EXPECT_EQ(even.budget("patchiness"), 0);
+  EXPECT_EQ(even.json.at("unlisted").at("probability").get<double>(), 0);
+  EXPECT_GT(even.budget("registration"), 0);
+}
+
+TEST_F(DiagnoseTool, RefusesToLeaveOutWhatItDoesNotKnow) {
+  const Finished finished = diagnose({"--without", "gravity"});
+  EXPECT_EQ(finished.code, 2);
+  EXPECT_NE(finished.err.find("discrepancy"), std::string::npos) << finished.err;
+  EXPECT_FALSE(fs::exists(found_));
+}
+
 TEST_F(DiagnoseTool, SaysWhatOtherPriorsAndLessTrustWouldChangeAndNothingElse) {
   const Finished finished = diagnose({"--no-other-meshes"});
   ASSERT_EQ(finished.code, 0) << finished.err;

@@ -369,6 +369,7 @@ class Arguments(unittest.TestCase):
                             (["--prior", "--set", "pairs"], "--prior excludes --set"),
                             (["--seed", "3", "--seed-from", "v1"], "--seed excludes --seed-from"),
                             (["--seed-from", "no-such-tag"], "there is no such tag"),
+                            (["--without", "landmarks"], "--without needs --again"),
                             (["--first", "0"], "counted from 1")):
             with self.assertRaisesRegex(SystemExit, says):
                 hidden.arguments(["work", *words])
