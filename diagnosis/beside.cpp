@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/log_sum.h"
+#include "diagnosis/evidence/other_priors.h"
 
 namespace supine::diagnosis {
 namespace {
@@ -20,21 +21,29 @@ double doubt(const std::vector<Hypothesis>& hypotheses, int effect) {
   return most;
 }
 
+bool is_sure_by_half(const Findings& found, int effect) {
+  return inclusion(half_believed(found.hypotheses, found.priors), effect) >= found.priors.named_at;
+}
+
 }  // namespace
 
 std::vector<int> surest_part(const Findings& found) {
   const std::vector<Hypothesis>& all = found.hypotheses;
   std::vector<int> part;
-  if (!found.beside.empty()) part = found.beside.back().effects;
+  if (!found.beside.empty() && is_part_of(found.beside.back().effects, all.front().effects))
+    part = found.beside.back().effects;
   int next = -1;
   for (const int e : all.front().effects)
     if (!is_part_of({e}, part) && (next < 0 || doubt(all, e) < doubt(all, next))) next = e;
   if (next < 0 || inclusion(all, next) < found.priors.named_at) return {};
   part.insert(std::upper_bound(part.begin(), part.end(), next), next);
+  if (std::any_of(found.beside.begin(), found.beside.end(),
+                  [&part](const Findings::Beside& beside) { return beside.effects == part; }))
+    return {};
   double more = 0;
   for (const Hypothesis& h : all)
     if (is_part_of(part, h.effects) && h.effects.size() > part.size()) more += h.probability;
-  return more > likelier_than_not ? part : std::vector<int>{};
+  return more > likelier_than_not || !is_sure_by_half(found, next) ? part : std::vector<int>{};
 }
 
 double ln_odds_of(const std::vector<Hypothesis>& hypotheses, const std::vector<int>& part) {

@@ -172,6 +172,7 @@ void follow(const Subject& subject, const ExamineOptions& options, Findings& fou
   if (options.refits > 0) {
     std::vector<std::vector<int>> looked_at;
     follow_parts_of_first(sets, looked_at);
+    follow_nothing_again(sets);
     look_beside(sets);
     if (do_without_idle(sets)) {
       sets.settle_strengths();

@@ -207,33 +207,46 @@ simulation::ChainSolution carried(const simulation::ChainSolution& solution, con
   return there;
 }
 
+/// Shapes moved by what others have moved since then.
+simulation::ChainSolution moved(simulation::ChainSolution shapes, const simulation::ChainSolution& then,
+                                const simulation::ChainSolution& now) {
+  shapes.prone += now.prone - then.prone;
+  shapes.X += now.X - then.X;
+  for (std::size_t p = 0; p < shapes.poses.size(); ++p) shapes.poses[p].x += now.poses[p].x - then.poses[p].x;
+  return shapes;
+}
+
 /// What another mesh changes, and the model on it.
-/// @param near  the same of a similar model: its mesh, in place of the one that @p make makes, and where to start from.
-///   Either may be missing: the mesh was not made, or the model had no equilibrium on it
+/// @param near  the same of a similar model: its mesh, in place of the one that @p make makes, and where to start from,
+///   as far as the body has not moved since. Either may be missing: the mesh was not made, or the model had no
+///   equilibrium on it
 template <class Make>
 Eigen::VectorXd change_on(const calibration::MeasuredScene& scene, const simulation::Model& model,
-                          const calibration::Fit& fit, const NumericalError::OnOther* near, Make make,
+                          const calibration::Fit& fit, const NumericalError::OnOther* near, int most_work, Make make,
                           NumericalError::OnOther& result) {
   const bool known = near != nullptr && near->mesh;
   result.mesh = known ? near->mesh : std::make_shared<const meshing::TetMesh>(make());
+  result.given = carried(fit.prediction.solution, *scene.mesh, *result.mesh);
   const simulation::ChainSolution start = known && near->solution.X.rows() > 0
-                                              ? near->solution
-                                              : carried(fit.prediction.solution, *scene.mesh, *result.mesh);
-  calibration::Prediction there = predicted_on(scene, *result.mesh, model, &start, enough());
+                                              ? moved(near->solution, near->given, result.given)
+                                              : result.given;
+  simulation::SolveOptions options = enough();
+  options.most_work = most_work;
+  calibration::Prediction there = predicted_on(scene, *result.mesh, model, &start, options);
   result.solution = std::move(there.solution);
   return change(fit.residuals.distance_mm, distances_of(fit.residuals, there));
 }
 
 /// The same for quadratic ones, on two meshes side by side.
 void measure_on_two(const calibration::MeasuredScene& scene, const simulation::Model& model,
-                    const calibration::Fit& fit, const NumericalError* near, NumericalError& result) {
+                    const calibration::Fit& fit, const NumericalError* near, int most_work, NumericalError& result) {
   const auto finer = [&] {
     const auto make = [&] { return other_mesh(*scene.mesh, edge_share); };
-    result.finer_mm = change_on(scene, model, fit, near ? &near->on_finer : nullptr, make, result.on_finer);
+    result.finer_mm = change_on(scene, model, fit, near ? &near->on_finer : nullptr, most_work, make, result.on_finer);
   };
   const auto coarser = [&] {
     const auto make = [&] { return coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share); };
-    result.coarser_mm = change_on(scene, model, fit, near ? &near->on_coarser : nullptr, make, result.on_coarser);
+    result.coarser_mm = change_on(scene, model, fit, near ? &near->on_coarser : nullptr, most_work, make, result.on_coarser);
   };
   side_by_side({[&] { attempt(result.finer_failure, finer); }, [&] { attempt(result.coarser_failure, coarser); }});
 }
@@ -314,12 +327,12 @@ double correlation_length_mm(const Residuals& residuals, const Eigen::VectorXd& 
 }
 
 NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, const simulation::Model& model,
-                                       const calibration::Fit& fit, const NumericalError* near) {
+                                       const calibration::Fit& fit, const NumericalError* near, int most_work) {
   NumericalError result;
   if (scene.mesh->order() == 1)
     attempt(result.finer_failure, [&] { measure_of_linear(scene, model, fit, near, result); });
   else
-    measure_on_two(scene, model, fit, near, result);
+    measure_on_two(scene, model, fit, near, most_work, result);
   if (result.coarser_mm.size() == 0 && result.coarser_failure.empty()) result.coarser_failure = result.finer_failure;
   summarise(scene, fit, result);
   return result;

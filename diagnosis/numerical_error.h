@@ -30,6 +30,7 @@ struct NumericalError {
   struct OnOther {
     std::shared_ptr<const meshing::TetMesh> mesh;
     simulation::ChainSolution solution;
+    simulation::ChainSolution given;  ///< that on the given mesh, carried to the nodes of this one
   };
   OnOther on_finer, on_coarser;
 };
@@ -49,9 +50,11 @@ double way_mm(const simulation::ChainSolution& solution);
 ///   finer = r (q − l),   coarser = (l − given + (1 − r)(q − l)) / max(1, r⁻² − 1),
 /// the latter what is left of the change between the two linear ones: the surface, of second order.
 /// Of quadratic ones: a mesh refined at the skin's end, and one on a coarser surface.
-/// @param near  of the same scene and a similar model, to start from; or nullptr
+/// @param near       of the same scene and a similar model, to start from; or nullptr
+/// @param most_work  of each solve on another mesh of quadratic elements (SolveOptions::most_work)
 NumericalError measure_numerical_error(const calibration::MeasuredScene& scene, const simulation::Model& model,
-                                       const calibration::Fit& fit, const NumericalError* near = nullptr);
+                                       const calibration::Fit& fit, const NumericalError* near = nullptr,
+                                       int most_work = simulation::SolveOptions().most_work);
 
 /// Length l of exp(−r/l) that fits the correlation of neighbours in @p field, a change over the residuals' points with
 /// or without a mean; between 5 and 60 mm.

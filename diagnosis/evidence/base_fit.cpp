@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "calibration/noise.h"
+#include "calibration/work_limit.h"
 #include "common/error.h"
 #include "common/side_by_side.h"
 #include "diagnosis/creases.h"
@@ -145,8 +146,10 @@ void find_errors(Evaluator& evaluator, JointFitter& fitter, const Priors& priors
   std::optional<NumericalError> numerical;
   std::vector<std::function<void()>> works{[&] { find_body(evaluator, *sensitivities, priors, base); }};
   if (other_meshes)
-    works.insert(works.begin(),
-                 [&] { numerical = measure_numerical_error(evaluator.scene(), base.model, base.fit, meshes); });
+    works.insert(works.begin(), [&] {
+      numerical = measure_numerical_error(evaluator.scene(), base.model, base.fit, meshes,
+                                          calibration::most_work_beside(base.dearest));
+    });
   side_by_side(works);
   base.numerical = std::move(numerical);
   add_up_errors(evaluator, priors, base);
@@ -277,6 +280,7 @@ std::unique_ptr<BaseFit> ground_beside(const calibration::MeasuredScene& scene, 
   static_cast<JointFit&>(*ground) = at;
   ground->fit.mask = base.fit.mask;
   ground->noise_mm = base.noise_mm;
+  ground->dearest = std::max(at.dearest, base.dearest);
   ground->clusters = base.clusters;
   Evaluator evaluator(scene, at.model, accurate_enough());
   NumericalError meshes;  // without solutions: those are of a model that lacks the effects

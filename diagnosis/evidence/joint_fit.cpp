@@ -63,13 +63,14 @@ void solve_first(calibration::Evaluator& evaluator, const std::vector<std::strin
   if (rms(fit.fit.residuals.skin_mm()) < lost_mm) return;
   const calibration::PointMask mask = fit.fit.mask;
   JointFit best = fit;
+  const calibration::TrialLimit limit(evaluator.chain(), fit.fit.prediction.solution.dearest_solve);
   for (const double times : other_moduli) {
     JointFit trial = fit;
     trial.fit.mask = mask;
     try {
       solve(evaluator, poses, {scaled(*fit.parameters, at.u, times), at.nuisances}, nullptr, ground, trial);
     } catch (const NumericalFailure&) {
-      continue;  // no equilibrium with these
+      continue;  // no equilibrium with these, or none that costs as little
     }
     fit.evaluations = trial.evaluations, fit.history = trial.history;
     if (rms(trial.fit.residuals.skin_mm()) < rms(best.fit.residuals.skin_mm())) best = std::move(trial);

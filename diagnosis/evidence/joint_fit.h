@@ -53,7 +53,7 @@ class JointFitter {
   const std::vector<std::string>& poses() const { return poses_; }
 
   /// Takes the fit to a trial. The first of all, where it is more than lost_mm off, also tries other moduli, 0.25 to 4
-  /// times as stiff, and takes the nearest: closest points of a slender body may lie on its wrong side.
+  /// times as stiff (work_limit.h), and takes the nearest: closest points of a slender body may lie on its wrong side.
   /// @throws NumericalFailure  no equilibrium there; the fit is then at neither place
   void predict(const JointTrial& at, const simulation::ChainSolution* near);
   /// Slopes of parameters and nuisances at the prediction.

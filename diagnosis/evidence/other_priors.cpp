@@ -57,17 +57,6 @@ void halve_unlisted(double prior, Hypothesis& h) {
   for (double& share : h.with_unlisted) share /= sum;
 }
 
-/// The hypotheses with half of the logarithm of what the scans say of each.
-std::vector<Hypothesis> half_believed(std::vector<Hypothesis> hypotheses, const Priors& priors) {
-  for (Hypothesis& h : hypotheses) {
-    const double of_errors = h.ground != nullptr ? h.ground->ln_weight : 0;  // which stays in the weight of h
-    h.ln_evidence = (h.ln_evidence + of_errors) / 2 - of_errors;
-    halve_unlisted(priors.unlisted, h);
-  }
-  normalise(hypotheses);
-  return hypotheses;
-}
-
 /// With what was left out, and ends of ranges, as they were asked for before.
 std::vector<Inclusion> included_in(const std::vector<Hypothesis>& hypotheses, const std::vector<std::string>& effects,
                                    const std::vector<Inclusion>& before, const Priors& priors) {
@@ -81,6 +70,16 @@ std::vector<Inclusion> included_in(const std::vector<Hypothesis>& hypotheses, co
 }
 
 }  // namespace
+
+std::vector<Hypothesis> half_believed(std::vector<Hypothesis> hypotheses, const Priors& priors) {
+  for (Hypothesis& h : hypotheses) {
+    const double of_errors = h.ground != nullptr ? h.ground->ln_weight : 0;  // which stays in the weight of h
+    h.ln_evidence = (h.ln_evidence + of_errors) / 2 - of_errors;
+    halve_unlisted(priors.unlisted, h);
+  }
+  normalise(hypotheses);
+  return hypotheses;
+}
 
 std::vector<OtherPrior> under_other_priors(const std::vector<Hypothesis>& hypotheses,
                                            const std::vector<std::string>& effects,

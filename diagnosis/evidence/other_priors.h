@@ -20,11 +20,15 @@ struct OtherPrior {
   bool of_prior = true;  ///< else of the scans
 };
 
+/// The hypotheses weighed with half of the logarithm of what the scans say of each: with the square root of every Bayes
+/// factor.
+std::vector<Hypothesis> half_believed(std::vector<Hypothesis> hypotheses, const Priors& priors);
+
 /// The verdict with the prior widths of all strengths, and with the scale of what is unexplained, halved and doubled.
 /// Hypotheses are weighed again where they were linearised; those under a thousandth of the probability keep the
 /// evidence they have. What was left out and what is unexplained count as they are.
 ///
-/// Last with the square root of every Bayes factor, as if the scans counted for half of what they say (Miller and
+/// Last half believed, as if the scans counted for half of what they say (Miller and
 /// Dunson 2019, "Robust Bayesian inference via coarsening"): over cases with a known answer stated odds are twice as
 /// far from the prior's, in the logarithm, as frequencies are (docs/hidden.md).
 std::vector<OtherPrior> under_other_priors(const std::vector<Hypothesis>& hypotheses,

@@ -297,6 +297,24 @@ Refit refit_within(const calibration::MeasuredScene& scene, const simulation::Mo
   return result;
 }
 
+double promised_without(const Refit& refit, const std::vector<const Candidate*>& effects) {
+  const LinearEvidence& evidence = *refit.hypothesis.evidence;
+  const Directions& all = evidence.directions();
+  VectorXd distances = evidence.distances();
+  std::vector<int> others;
+  for (const int row : refit.hypothesis.rows) {
+    const std::string& name = all.names[static_cast<std::size_t>(row)];
+    bool of_effect = false;
+    for (const Candidate* effect : effects) {
+      of_effect = of_effect || name.starts_with(effect->effect + ".");
+      for (const CandidateParameter& number : effect->parameters)
+        if (number.name == name) distances += (number.null - all.stands[row]) / all.unit[row] * all.columns.col(row);
+    }
+    if (!of_effect) others.push_back(row);
+  }
+  return LinearEvidence(evidence.errors(), distances, all).weigh(others).ln_evidence;
+}
+
 bool does_nothing(const Refit& refit, const Candidate& candidate) {
   return std::all_of(candidate.parameters.begin(), candidate.parameters.end(), [&refit](const CandidateParameter& p) {
     const auto fitted = std::find_if(refit.parameters.begin(), refit.parameters.end(),

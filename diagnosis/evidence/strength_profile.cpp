@@ -20,7 +20,9 @@ using Eigen::VectorXd;
 constexpr double stride = 1.5;    // standard deviations between two places
 constexpr double fallen = 4;      // of ln, from the highest: no further place
 constexpr int most_per_side = 5;  // places
-constexpr double bent = 0.5;      // of what the usual size changes, that the slope does not say
+// Of F: a step that promises less stays on the lines, and what it promises counts in the evidence without being taken.
+constexpr double bend = 2;
+constexpr double bent = 0.5;  // of what the usual size changes, that the slope does not say
 
 struct Place {
   double u, ln_density;
@@ -136,7 +138,7 @@ class Walker {
     const FreeParameters rest(model);
     calibration::Evaluator evaluator(ground_.scene, rest.base(), accurate_enough());
     WeightedFit fit = weigh(evaluator, rest, ground_.metric, rest.clamped(others), &near);
-    descend(evaluator, rest, ground_.metric, {.max_iterations = 2, .settled = 0.5}, fit);
+    descend(evaluator, rest, ground_.metric, {.max_iterations = 2, .settled = bend}, fit);
     const LinearEvidence evidence(*ground_.base.covariance, ground_.base.distances(fit.solution.residuals),
                                   directions_at(fit.solution, rest, ground_.nuisances, ground_.base.clusters));
     const Weighed weighed = evidence.weigh_all();

@@ -30,8 +30,18 @@ TEST(Beside, NothingIsMeasuredAnewWhereNoEffectIsSureOrNothingMoreIsLikely) {
   add(unsure, {2, 5}, 0.6), add(unsure, {1}, 0.3), add(unsure, {}, 0.1);
   EXPECT_EQ(surest_part(unsure), std::vector<int>{});
   Findings alone;
-  add(alone, {5}, 0.6), add(alone, {2, 5}, 0.39), add(alone, {}, 0.01);
+  add(alone, {5}, 0.6), add(alone, {2, 5}, 0.3995), add(alone, {}, 0.0005);
   EXPECT_EQ(surest_part(alone), std::vector<int>{});
+}
+
+TEST(Beside, AnEffectThatWouldNotBeNamedIfTheScansCountedForHalfIsAskedAgainOnce) {
+  Findings found;
+  add(found, {5}, 0.97), add(found, {}, 0.03);
+  EXPECT_EQ(surest_part(found), (std::vector{5}));
+  found.beside.push_back({{5}, std::make_unique<BaseFit>()});
+  EXPECT_EQ(surest_part(found), std::vector<int>{});
+  found.beside.back().effects = {2};
+  EXPECT_EQ(surest_part(found), (std::vector{5})) << "the likeliest set does not hold what they were measured beside";
 }
 
 TEST(Beside, AThirdEffectIsJudgedBesideTwoThatAreSure) {
