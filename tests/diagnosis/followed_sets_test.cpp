@@ -172,6 +172,45 @@ TEST(Follow, NothingIsFollowedAgainFromWhereALikelyEffectEnded) {
   EXPECT_EQ(found->refits.size(), 1u) << "nothing is no refit";
 }
 
+TEST(Follow, NothingIsFollowedAgainWhereLinesBackFromAnEffectPromiseItHoweverLikelyTheEffectIs) {
+  const Twin twin({supine::testing::twin_truth(), twin_noise_mm});
+  const Subject subject = subject_of(twin);
+  const auto found = findings_of(subject, 0);
+  FollowedSets sets(subject, twin_options(5), *found);
+  const int effect = row_of(*found, "friction");
+  sets.follow_one({effect});
+  const double well = sets.hypothesis_of({}).ln_evidence;
+  const Candidate* candidate = &found->candidates[static_cast<std::size_t>(effect)];
+  EXPECT_NEAR(promised_without(*sets.refit_of({effect}), {candidate}), well, 1) << "there is no friction";
+  constexpr double elsewhere = 50;
+  sets.hypothesis_of({}).ln_evidence -= elsewhere;
+  sets.weigh();
+  ASSERT_LT(sets.hypothesis_of({}).probability, 1e-6);
+  follow_nothing_again(sets);
+  EXPECT_NEAR(sets.hypothesis_of({}).ln_evidence, well, 0.5);
+}
+
+TEST(Follow, ANameThatErrorsMeasuredBesideItMakeLightOfIsTakenBack) {
+  const Twin twin({supine::testing::twin_truth(), twin_noise_mm});
+  const Subject subject = subject_of(twin);
+  const auto found = findings_of(subject, 0);
+  constexpr double too_small = 0.02;  // noise stands out then
+  BaseFit& base = found->base;
+  base.errors *= too_small;
+  base.covariance = std::make_unique<ErrorCovariance>(base.errors, base.kernel, base.scale_mm, base.most_mm);
+  found->hypotheses = Screening(base, found->candidates, found->priors).hypotheses();
+  FollowedSets sets(subject, twin_options(5), *found);
+  int likeliest = 0;
+  for (int e = 0; e < static_cast<int>(found->candidates.size()); ++e)
+    if (sets.hypothesis_of({e}).probability > sets.hypothesis_of({likeliest}).probability) likeliest = e;
+  found->hypotheses = {sets.hypothesis_of({}), sets.hypothesis_of({likeliest})};
+  sets.follow_one({likeliest});
+  ASSERT_GT(inclusion(found->hypotheses, likeliest), found->priors.named_at) << found->effects()[likeliest];
+  look_beside(sets);
+  ASSERT_EQ(found->beside.size(), 1u);
+  EXPECT_LT(inclusion(found->hypotheses, likeliest), 0.5);
+}
+
 TEST(Follow, NothingIsNotAskedAgainWhereItIsOutOfTheQuestion) {
   const Twin twin({twin_with("chest_wall_motion", "amplitude_mm", 6), twin_noise_mm});
   const Subject subject = subject_of(twin);
