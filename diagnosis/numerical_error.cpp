@@ -227,9 +227,8 @@ Eigen::VectorXd change_on(const calibration::MeasuredScene& scene, const simulat
   const bool known = near != nullptr && near->mesh;
   result.mesh = known ? near->mesh : std::make_shared<const meshing::TetMesh>(make());
   result.given = carried(fit.prediction.solution, *scene.mesh, *result.mesh);
-  const simulation::ChainSolution start = known && near->solution.X.rows() > 0
-                                              ? moved(near->solution, near->given, result.given)
-                                              : result.given;
+  const simulation::ChainSolution start =
+      known && near->solution.X.rows() > 0 ? moved(near->solution, near->given, result.given) : result.given;
   simulation::SolveOptions options = enough();
   options.most_work = most_work;
   calibration::Prediction there = predicted_on(scene, *result.mesh, model, &start, options);
@@ -246,7 +245,8 @@ void measure_on_two(const calibration::MeasuredScene& scene, const simulation::M
   };
   const auto coarser = [&] {
     const auto make = [&] { return coarser_mesh(*scene.mesh, *scene.anatomy, triangle_share); };
-    result.coarser_mm = change_on(scene, model, fit, near ? &near->on_coarser : nullptr, most_work, make, result.on_coarser);
+    result.coarser_mm =
+        change_on(scene, model, fit, near ? &near->on_coarser : nullptr, most_work, make, result.on_coarser);
   };
   side_by_side({[&] { attempt(result.finer_failure, finer); }, [&] { attempt(result.coarser_failure, coarser); }});
 }

@@ -46,8 +46,8 @@ struct Priors {
   std::optional<double> independent_points_in(const std::string& pose) const;
 };
 
-/// What a diagnosis can be made without, to see what it rests on: forces that nobody knows of; places of scans, gravity,
-/// breath and all else that is never known; that every body is uneven.
+/// What a diagnosis can be made without, to see what it rests on: forces that nobody knows of; places of scans,
+/// gravity, breath and all else that is never known; that every body is uneven.
 enum class Allowance { discrepancy, nuisances, patchiness };
 /// The same as if there were no such thing. Without patchiness no local cause is weighed.
 Priors without(Allowance what, Priors priors);

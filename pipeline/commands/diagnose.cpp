@@ -64,10 +64,11 @@ class DiagnoseTool : public Tool {
            "a way that no effect lists; 0 = that is not weighed")
         ->check(within(0, 0.9))
         ->capture_default_str();
-    app.add_option("--without", options_.without,
-                   "to see what a verdict rests on: examine as if there were no discrepancy (forces that nobody knows "
-                   "of), nuisances (places of scans, gravity, breath, ...), patchiness (uneven tissue, skin and muscle, "
-                   "local causes) or landmarks; several with commas between them")
+    app.add_option(
+           "--without", options_.without,
+           "to see what a verdict rests on: examine as if there were no discrepancy (forces that nobody knows "
+           "of), nuisances (places of scans, gravity, breath, ...), patchiness (uneven tissue, skin and muscle, "
+           "local causes) or landmarks; several with commas between them")
         ->delimiter(',')
         ->check(CLI::IsMember({"discrepancy", "nuisances", "patchiness", "landmarks"}));
     app.add_flag("--ladder", ladder_,
@@ -83,8 +84,8 @@ class DiagnoseTool : public Tool {
     options_.check();
     check_model_target(run);
     announce_png(run, png_, folder() / "diagnosis.vtp");
-    const CaseToDiagnose subject = measure_to_diagnose(
-        run, read_case_inputs(run, case_folder_, mesh_file_, model()), options_.without);
+    const CaseToDiagnose subject =
+        measure_to_diagnose(run, read_case_inputs(run, case_folder_, mesh_file_, model()), options_.without);
     const MeasuredCase& measured = *subject.measured;
     LiveProgress live(run, std::chrono::seconds(0));
     const diagnosis::ExamineOptions options = examine_options(subject, options_, live);

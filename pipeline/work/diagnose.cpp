@@ -20,10 +20,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::pair<std::string, diagnosis::Allowance> allowances[] = {
-    {"discrepancy", diagnosis::Allowance::discrepancy},
-    {"nuisances", diagnosis::Allowance::nuisances},
-    {"patchiness", diagnosis::Allowance::patchiness}};
+const std::pair<std::string, diagnosis::Allowance> allowances[] = {{"discrepancy", diagnosis::Allowance::discrepancy},
+                                                                   {"nuisances", diagnosis::Allowance::nuisances},
+                                                                   {"patchiness", diagnosis::Allowance::patchiness}};
 
 void warn_of_missing_mesh(Run& run, const diagnosis::NumericalError& error) {
   if (error.finer_failure.empty() && error.coarser_failure.empty()) return;
@@ -113,8 +112,7 @@ void DiagnoseOptions::check() const {
   for (const std::string& name : without)
     if (name != "landmarks" && std::none_of(std::begin(allowances), std::end(allowances),
                                             [&name](const auto& one) { return one.first == name; }))
-      throw InputError(
-          fmt::format("without = {}: must be discrepancy, nuisances, patchiness or landmarks", name));
+      throw InputError(fmt::format("without = {}: must be discrepancy, nuisances, patchiness or landmarks", name));
   if (prior_of_sets.size() != 0 && prior_of_sets.size() != 4)
     throw InputError(fmt::format("--prior {}: must be four numbers, of nothing, one, two and three effects",
                                  fmt::join(prior_of_sets, ",")));

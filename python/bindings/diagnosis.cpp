@@ -71,11 +71,15 @@ void bind_diagnosis(py::module_& module) {
          unsigned seed, std::optional<double> registration_mm, std::optional<double> segmentation_mm,
          std::optional<double> chest_wall_mm, std::vector<double> prior, double unlisted,
          std::vector<std::string> without, py::object progress) {
-        return diagnose(
-            description, mesh, model,
-            {refits, other_meshes, seed, {registration_mm, segmentation_mm, chest_wall_mm}, unlisted, std::move(prior),
-             std::move(without)},
-            std::move(progress));
+        return diagnose(description, mesh, model,
+                        {refits,
+                         other_meshes,
+                         seed,
+                         {registration_mm, segmentation_mm, chest_wall_mm},
+                         unlisted,
+                         std::move(prior),
+                         std::move(without)},
+                        std::move(progress));
       },
       py::arg("case"), py::arg("mesh"), py::arg("model"), py::kw_only(), py::arg("refits") = 5,
       py::arg("other_meshes") = true, py::arg("seed") = 1, py::arg("registration_mm") = py::none(),
