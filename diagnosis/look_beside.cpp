@@ -42,7 +42,7 @@ double lead_lost(const FollowedSets& sets, const Hypothesis& before, const Refit
                  int effect) {
   std::vector<int> rest = before.effects;
   std::erase(rest, effect);
-  if (!sets.was_screened(rest) || !sets.hypothesis_of(rest).refitted) return 0;
+  if (!sets.was_screened(rest) || !(rest.empty() || sets.hypothesis_of(rest).refitted)) return 0;
   const Hypothesis& without = sets.hypothesis_of(rest);
   const Refit then =
       refit_within(sets.subject.scene, sets.subject.given, ground, again, sets.found.candidates, without);
