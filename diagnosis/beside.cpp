@@ -43,7 +43,8 @@ std::vector<int> surest_part(const Findings& found) {
   double more = 0;
   for (const Hypothesis& h : all)
     if (is_part_of(part, h.effects) && h.effects.size() > part.size()) more += h.probability;
-  return more > likelier_than_not || !is_sure_by_half(found, next) ? part : std::vector<int>{};
+  const bool doubtful = part.size() == 1 && !is_sure_by_half(found, next);
+  return more > likelier_than_not || doubtful ? part : std::vector<int>{};
 }
 
 double ln_odds_of(const std::vector<Hypothesis>& hypotheses, const std::vector<int>& part) {

@@ -8,10 +8,11 @@
 namespace supine::diagnosis {
 
 /// What would be named by itself, the surest effect of it, where errors that were measured without it should not have
-/// the last word: where more than it is likelier than not, because they judge what is beside it, and where it would not
-/// be named if the scans counted for half (other_priors.h), because they judge itself. Together with what errors were
-/// last measured beside, where the likeliest set holds that. Empty where there is no such effect, or where they were
-/// measured beside it.
+/// the last word: where more than it is likelier than not, because they judge what is beside it, and where, the first
+/// of all, it would not be named if the scans counted for half (other_priors.h), because they judge itself; what is
+/// beside it is judged under errors measured beside an effect already. Together with what errors were last measured
+/// beside, where the likeliest set holds that. Empty where there is no such effect, or where they were measured beside
+/// it.
 std::vector<int> surest_part(const Findings& found);
 
 /// ln of the odds that a set holds a part, every set under the errors it is weighed under.
