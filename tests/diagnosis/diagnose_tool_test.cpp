@@ -127,8 +127,7 @@ TEST_F(DiagnoseTool, ExaminesAsIfThereWereNoneOfWhatIsLeftOut) {
   };
   EXPECT_LT(without("discrepancy").json.at("unexplained95")[1].get<double>(), 0.1);
   const Without placed = without("nuisances");
-  for (const Json& place : placed.json.at("registration"))
-    for (const Json& sd : place.at("sd")) EXPECT_EQ(sd.get<double>(), 0);
+  for (const Json& sigma : placed.json.at("nuisances_sigma")) EXPECT_EQ(sigma.get<double>(), 0);
   EXPECT_EQ(placed.budget("registration"), 0);
   EXPECT_GT(placed.budget("patchiness"), 0);
   const Without even = without("patchiness");
