@@ -15,9 +15,9 @@ namespace supine::diagnosis {
 /// part.
 ///
 /// Errors of mesh and body are those of a model that lacks nothing. Where one effect is sure and more beside it is
-/// likelier than not, they are measured anew beside that effect, and whatever holds it is weighed under these: what a
-/// tied breast shows that an untied one does not must not count for a second effect. With two that are sure again, for
-/// a third.
+/// likelier than not, or where it would not be if the scans counted for half (beside.h), they are measured anew beside
+/// that effect, and whatever holds it is weighed under these: what a tied breast shows that an untied one does not must
+/// not count for a second effect. With two that are sure again, for a third.
 ///
 /// An effect may have stood for something that was found beside it since: then its strength ends where it does nothing,
 /// yet no set without it was ever fitted as well. Its set is followed without it from where the whole ended, and all is

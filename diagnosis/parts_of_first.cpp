@@ -33,7 +33,7 @@ const Refit* likelier_than_nothing(const FollowedSets& sets, const Hypothesis& n
 const Refit* promising_nothing(const FollowedSets& sets, const Hypothesis& nothing) {
   return best_single(sets, nothing, [&sets](const Refit& refit) {
     const auto effect = static_cast<std::size_t>(refit.hypothesis.effects.front());
-    return promised_without(refit, {&sets.found.candidates[effect]});
+    return promised_without(refit, sets.found.candidates[effect]);
   });
 }
 

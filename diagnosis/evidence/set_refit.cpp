@@ -297,20 +297,16 @@ Refit refit_within(const calibration::MeasuredScene& scene, const simulation::Mo
   return result;
 }
 
-double promised_without(const Refit& refit, const std::vector<const Candidate*>& effects) {
+double promised_without(const Refit& refit, const Candidate& effect) {
   const LinearEvidence& evidence = *refit.hypothesis.evidence;
   const Directions& all = evidence.directions();
   VectorXd distances = evidence.distances();
   std::vector<int> others;
   for (const int row : refit.hypothesis.rows) {
     const std::string& name = all.names[static_cast<std::size_t>(row)];
-    bool of_effect = false;
-    for (const Candidate* effect : effects) {
-      of_effect = of_effect || name.starts_with(effect->effect + ".");
-      for (const CandidateParameter& number : effect->parameters)
-        if (number.name == name) distances += (number.null - all.stands[row]) / all.unit[row] * all.columns.col(row);
-    }
-    if (!of_effect) others.push_back(row);
+    if (!name.starts_with(effect.effect + ".")) others.push_back(row);
+    for (const CandidateParameter& number : effect.parameters)
+      if (number.name == name) distances += (number.null - all.stands[row]) / all.unit[row] * all.columns.col(row);
   }
   return LinearEvidence(evidence.errors(), distances, all).weigh(others).ln_evidence;
 }

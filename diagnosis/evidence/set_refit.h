@@ -61,11 +61,10 @@ Refit refit_again(const calibration::MeasuredScene& scene, const BaseFit& ground
 Refit refit_within(const calibration::MeasuredScene& scene, const simulation::Model& given, const BaseFit& ground,
                    const Refit& whole, const std::vector<Candidate>& candidates, const Hypothesis& part);
 
-/// ln of the evidence that a model without the effects of a refit is promised along straight lines from there, their
-/// numbers put back to their nulls and all else free: the refit's own errors and slopes. Of effects that are far from
-/// linear, and of those that replace what is never known, it is no more than a hint.
-/// @param effects  the candidates of its effects
-double promised_without(const Refit& refit, const std::vector<const Candidate*>& effects);
+/// ln of the evidence that a refit without one of its effects is promised along straight lines from there, the numbers
+/// of the effect put back to their nulls and all else free: the refit's own errors and slopes. Of an effect that is far
+/// from linear, and of one that replaces what is never known, it is no more than a hint.
+double promised_without(const Refit& refit, const Candidate& effect);
 
 /// Whether every strength of an effect may as well be what it is where the effect is not there, by its 95 % interval.
 bool does_nothing(const Refit& refit, const Candidate& candidate);
