@@ -191,4 +191,11 @@ bool FollowedSets::one_step_on_from_first() {
   return true;
 }
 
+bool FollowedSets::nothing_is_new_from(const Refit& refit) {
+  const std::pair from{refit.hypothesis.effects, refit.joint.fit.u};
+  if (std::find(nothing_from_.begin(), nothing_from_.end(), from) != nothing_from_.end()) return false;
+  nothing_from_.push_back(from);
+  return true;
+}
+
 }  // namespace supine::diagnosis

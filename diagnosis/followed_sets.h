@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/examine.h"
@@ -58,6 +59,8 @@ class FollowedSets {
   /// Lines from the likeliest, where none were drawn yet, and what they promise followed. @return  whether there was
   /// any
   bool one_step_on_from_first();
+  /// Whether "nothing" is followed from where a refit ended for the first time: a second one would end where that did.
+  bool nothing_is_new_from(const Refit& refit);
 
  private:
   std::size_t next_to_settle() const;
@@ -65,7 +68,8 @@ class FollowedSets {
   double evidence_at(int refit) const;
 
   bool bent_ = false;
-  std::vector<std::size_t> drawn_;  // refits
+  std::vector<std::size_t> drawn_;                                          // refits
+  std::vector<std::pair<std::vector<int>, Eigen::VectorXd>> nothing_from_;  // effects, and where the refit ended
 };
 
 }  // namespace supine::diagnosis

@@ -61,7 +61,7 @@ void follow_nothing_again(FollowedSets& sets) {
   Hypothesis& nothing = sets.hypothesis_of({});
   const Refit* from = likelier_than_nothing(sets, nothing);
   if (from == nullptr) from = promising_nothing(sets, nothing);
-  if (from == nullptr) return;
+  if (from == nullptr || !sets.nothing_is_new_from(*from)) return;
   sets.tell("from an effect, nothing again: without", from->hypothesis.effects);
   const Refit again =
       refit_within(sets.subject.scene, sets.subject.given, sets.found.base, *from, sets.found.candidates, nothing);

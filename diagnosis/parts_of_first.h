@@ -16,8 +16,8 @@ void follow_parts_of_first(FollowedSets& sets, std::vector<std::vector<int>>& lo
 /// "Nothing" is followed once more from where an effect by itself ended: a body that is soft may have moved on there by
 /// what has no part in the effect. From the likeliest, where that came out better and nothing is not out of the
 /// question yet; or from the one from which lines back to nothing promise most, where that is more than nothing was
-/// found to be, however likely the effect is: its own numbers do not exclude that it is not there. Of both fits of
-/// nothing the likelier is kept.
+/// found to be, however likely the effect is: its own numbers do not exclude that it is not there. Not twice from the
+/// same place. Of both fits of nothing the likelier is kept.
 void follow_nothing_again(FollowedSets& sets);
 
 }  // namespace supine::diagnosis

@@ -136,6 +136,24 @@ TEST_F(DiagnoseTool, ExaminesAsIfThereWereNoneOfWhatIsLeftOut) {
   EXPECT_GT(even.budget("registration"), 0);
 }
 
+TEST_F(DiagnoseTool, WithLandmarksLeftOutSaysWhatItSaysOfTheCaseThatHasNone) {
+  const auto hypotheses = [this](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"--no-other-meshes", "--force"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Finished finished = diagnose(words);
+    EXPECT_EQ(finished.code, 0) << finished.err;
+    return Json::parse(read_text(found_ / "diagnosis.json")).at("hypotheses");
+  };
+  const Json none = hypotheses({});
+  write_text(case_ / "prone.csv", "name,x,y,z\nnipple,0,-39,0\nupper,3,-29.2,24\n");
+  write_text(case_ / "supine.csv", "name,x,y,z\nnipple,0,-31.5,0\nupper,3,-24.2,24\n");
+  write_text(case_ / "case.toml",
+             replaced(read_text(case_ / "case.toml"), "supine.ply\"\n", "supine.ply\"\nlandmarks = \"supine.csv\"\n") +
+                 "[landmarks]\nprone = \"prone.csv\"\n");
+  EXPECT_EQ(hypotheses({"--without", "landmarks"}), none);
+  EXPECT_NE(hypotheses({}), none);
+}
+
 TEST_F(DiagnoseTool, RefusesToLeaveOutWhatItDoesNotKnow) {
   const Finished finished = diagnose({"--without", "gravity"});
   EXPECT_EQ(finished.code, 2);

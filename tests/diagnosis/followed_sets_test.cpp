@@ -179,6 +179,11 @@ TEST(Follow, NothingIsFollowedAgainFromWhereALikelyEffectEnded) {
   EXPECT_NEAR(sets.hypothesis_of({}).ln_evidence, well, 0.5);
   EXPECT_NEAR(sets.hypothesis_of({}).probability, likely, 0.05);
   EXPECT_EQ(found->refits.size(), 1u) << "nothing is no refit";
+  told.clear();
+  sets.hypothesis_of({}).ln_evidence -= elsewhere;
+  sets.weigh();
+  follow_nothing_again(sets);
+  EXPECT_TRUE(told.empty()) << "it was followed from there";
 }
 
 TEST(Follow, NothingIsFollowedAgainWhereLinesBackFromAnEffectPromiseItHoweverLikelyTheEffectIs) {

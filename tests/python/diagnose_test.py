@@ -24,6 +24,10 @@ class Diagnose(SmallCase):
         self.tool_says(wrong.exception, "supine-diagnose", CASE, MESH, "--model", model, "--prior", "0.5,0.3,0.1,0.05",
                        "-o", out / "other")
 
+    def test_what_cannot_be_left_out_is_refused(self):
+        with self.assertRaisesRegex(supine.InputError, "without = gravity: must be discrepancy"):
+            supine.diagnose(self.case, self.mesh, self.model, without=["gravity"])
+
     def test_what_an_effect_raises_in_a_thread_of_the_diagnosis_comes_back(self):
         class Fragile(supine.Effect):
             name = "python_fragile"

@@ -126,8 +126,12 @@ const TestScene& dome_scene(int order) {
     scene.anatomy = meshing::compute_anatomy(scene.mesh, "left");
     return scene;
   };
-  static const TestScene linear = make(1), quadratic_scene = make(2);
-  return order == 2 ? quadratic_scene : linear;
+  if (order == 2) {
+    static const TestScene quadratic_scene = make(2);
+    return quadratic_scene;
+  }
+  static const TestScene linear = make(1);
+  return linear;
 }
 
 simulation::Model soft_model(simulation::BulkLaw law, simulation::SkinLaw skin) {
