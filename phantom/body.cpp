@@ -120,7 +120,7 @@ Body draw_body(std::uint64_t seed, Population population) {
     body.breast_kpa = volunteer.breast_kpa;
     body.skin_kpa = volunteer.skin_kpa;
     body.nipple_moves_mm = volunteer.nipple_moves_mm;
-    body.on_chest = true;
+    body.real_size = true;
     draw_organs(body, random);
     return body;
   }

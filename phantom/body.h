@@ -28,7 +28,7 @@ struct Body {
   double tumour_radius_mm;
   double breast_kpa, skin_kpa;  ///< Young's moduli; the skin is 1.5 mm thick
   double nipple_moves_mm = 0;   ///< from prone to supine, to which both moduli are scaled; 0: they stay as drawn
-  bool on_chest = false;        ///< what comes to lie on the chest beside the breast is carried by it
+  bool real_size = false;       ///< lies on the chest beside it where it falls so far, and its skin resists bending
 
   /// Columns lateral, head, outward in LPS; determinant -1 on the right side.
   Eigen::Matrix3d frame() const;

@@ -62,30 +62,34 @@ landmarks = "{0}_landmarks.csv"
   return text;
 }
 
-constexpr const char* model_text = R"([breast]
+constexpr const char* contact_text = R"([contact]
+kind = "chest"
+)";
+
+/// @param real_size  skin that resists bending, and the chest beside the breast
+std::string model_text(bool real_size) {
+  return fmt::format(R"([breast]
 law = "neo_hookean"
-young_modulus_kpa = { value = 0.5, prior_sd = 0.4, lower = 0.05, upper = 5 }
+young_modulus_kpa = {{ value = 0.5, prior_sd = 0.4, lower = 0.05, upper = 5 }}
 poisson_ratio = 0.45
 density_kg_m3 = 1000
 density_refers_to = "undeformed"
 [skin]
 law = "neo_hookean"
-young_modulus_kpa = { value = 20, prior_sd = 20, lower = 0.5, upper = 300 }
+young_modulus_kpa = {{ value = 20, prior_sd = 20, lower = 0.5, upper = 300 }}
 thickness_mm = 1.5
 compression = "tension_field"
 compression_share = 0.05
-[interface]
+{}[interface]
 kind = "sliding"
 normal_kpa_per_mm = 3.0
 tangential_kpa_per_mm = 0.01
 [cut]
 kind = "elastic"
 stiffness_kpa_per_mm = 1.0
-)";
-
-constexpr const char* contact_text = R"([contact]
-kind = "chest"
-)";
+{})",
+                     real_size ? "bending_share = 3\n" : "", real_size ? contact_text : "");
+}
 
 // One gzip member without name or time.
 std::string gzipped(const std::vector<std::uint8_t>& bytes) {
@@ -163,7 +167,7 @@ void write_series_folder(const fs::path& folder, const fs::path& truth, const Ma
                          Outputs& outputs) {
   const std::string name = fs::absolute(folder).lexically_normal().filename().string();
   write_text(series_case_text(name, series), folder / "case.toml", outputs);
-  write_text(model_text, folder / "model.toml", outputs);
+  write_text(model_text(false), folder / "model.toml", outputs);
   std::vector<std::uint8_t> bytes;
   bytes.reserve(2 * made.image.voxels.size());
   for (const float grey : made.image.voxels) {
@@ -178,7 +182,7 @@ void write_series_folder(const fs::path& folder, const fs::path& truth, const Ma
 void write_case_folder(const fs::path& folder, const CaseContents& contents, Outputs& outputs) {
   const std::string name = fs::absolute(folder).lexically_normal().filename().string();
   write_text(case_text(name, contents), folder / "case.toml", outputs);
-  write_text(std::string(model_text) + (contents.on_chest ? contact_text : ""), folder / "model.toml", outputs);
+  write_text(model_text(contents.real_size), folder / "model.toml", outputs);
   write_text(nrrd_text(contents.labels.grid, "uint8", contents.labels.voxels), folder / "labels.nrrd", outputs);
   write_landmarks(contents.prone_landmarks, outputs.stage(folder / "prone_landmarks.csv"));
   for (const MeasuredPose& pose : contents.poses) {

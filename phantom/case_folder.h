@@ -26,7 +26,7 @@ struct CaseContents {
   Landmarks prone_landmarks;
   Eigen::Vector3d prone_gravity;
   std::vector<MeasuredPose> poses;
-  bool on_chest = false;  ///< the model is written with contact of skin with the chest beside the breast
+  bool real_size = false;  ///< the model is written with contact with the chest beside the breast, and bending skin
 };
 
 /// Writes case.toml, model.toml (the generic base model to start from), labels.nrrd, the scans and landmarks.

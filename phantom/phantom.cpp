@@ -170,7 +170,7 @@ Phantom make_phantom(const PhantomOptions& options) {
   contents.labels = label_voxels(body_mesh, phantom.body, prone.x, options.seed, {options.voxel_mm, grown_mm(phantom)});
   contents.prone_landmarks = mark_skin(body_mesh, phantom.body, "prone", prone.x, options.seed);
   contents.prone_gravity = prone.gravity;
-  contents.on_chest = phantom.body.on_chest;
+  contents.real_size = phantom.body.real_size;
   scan_all(body_mesh, options, phantom);
   return phantom;
 }

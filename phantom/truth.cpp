@@ -39,7 +39,10 @@ simulation::Model truth_model(const Body& body) {
   model.breast.density_refers_to = simulation::DensityReference::undeformed;
   model.skin.law = simulation::SkinLaw::neo_hookean;
   model.skin.young_modulus_kpa.value = body.skin_kpa;
-  if (body.on_chest) model.contact.kind = simulation::ContactKind::chest;
+  if (body.real_size) {
+    model.contact.kind = simulation::ContactKind::chest;
+    model.skin.bending_share = 3;
+  }
   return model;
 }
 
@@ -89,7 +92,7 @@ void Truth::solve(std::vector<TruthPose>& poses, Start start) {
                      start == Start::shapes ? &near : nullptr);
     } catch (const simulation::NoEquilibrium&) {
       // Other populations stay what they were.
-      if (!body_.on_chest || &pose == &poses.front() || !turn_over(solver, poses.front(), pose)) throw;
+      if (!body_.real_size || &pose == &poses.front() || !turn_over(solver, poses.front(), pose)) throw;
     }
   }
 }

@@ -37,6 +37,7 @@ struct Fields {
   Column skin_compression;  ///< #skin faces; share of the full energy kept where the skin wrinkles
   Column skin_prestretch;   ///< #skin faces; stretch already there in the undeformed shape, 1 = none
   Column skin_stiffening;   ///< #skin faces; b of the exponential law, >= 0
+  Column skin_bending;      ///< #skin faces; bending stiffness over skin_modulus, mm²
   Column skin_traction;     ///< 3 per skin face, xyz; dead load per undeformed area, kPa
 
   Column interface_normal;      ///< #interface points; kPa/mm
@@ -70,6 +71,7 @@ inline constexpr FieldColumn<T> field_columns[] = {{"ln_young", &Fields<T>::ln_y
                                                    {"skin_compression", &Fields<T>::skin_compression},
                                                    {"skin_prestretch", &Fields<T>::skin_prestretch},
                                                    {"skin_stiffening", &Fields<T>::skin_stiffening},
+                                                   {"skin_bending", &Fields<T>::skin_bending},
                                                    {"skin_traction", &Fields<T>::skin_traction},
                                                    {"interface_normal", &Fields<T>::interface_normal},
                                                    {"interface_tangential", &Fields<T>::interface_tangential},

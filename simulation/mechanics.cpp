@@ -15,6 +15,7 @@
 #include "simulation/terms/gravity.h"
 #include "simulation/terms/interface.h"
 #include "simulation/terms/skin.h"
+#include "simulation/terms/skin_bending.h"
 #include "simulation/terms/skin_end_fade.h"
 #include "simulation/terms/support.h"
 #include "simulation/terms/traction.h"
@@ -101,11 +102,19 @@ Mechanics::Mechanics(const meshing::TetMesh& mesh, const meshing::Anatomy& anato
       throw InputError(
           fmt::format("[supports.{}] of the model is no support of this body; {}", name,
                       mesh.support_names.empty() ? "it has none with a name" : suggestion(name, mesh.support_names)));
-  pattern_ = same_mesh ? same_mesh->pattern_ : std::make_shared<const Pattern>(mesh.cells, mesh.points.rows());
-  cells_ = same_mesh ? same_mesh->cells_ : std::make_shared<const Elements>(mesh.cells, *pattern_);
+  const TrianglePatches patches = model.skin.bending_share > 0 && model.skin.young_modulus_kpa.value > 0
+                                      ? triangle_patches(rows_of(mesh.faces, layout_.skin.faces))
+                                      : TrianglePatches{};
+  bends_ = patches.nodes.rows() > 0;
+  const bool shared = same_mesh != nullptr && same_mesh->bends_ == bends_;
+  pattern_ =
+      shared ? same_mesh->pattern_ : std::make_shared<const Pattern>(mesh.cells, patches.nodes, mesh.points.rows());
+  cells_ = shared ? same_mesh->cells_ : std::make_shared<const Elements>(mesh.cells, *pattern_);
   terms_ = mesh.order() == 2 ? make_terms<Tet10, Tri6>(mesh, anatomy, model, layout_, *pattern_, cells_)
                              : make_terms<Tet4, Tri3>(mesh, anatomy, model, layout_, *pattern_, cells_);
   volume_ = dynamic_cast<const VolumeStrainTerm*>(terms_.front().get());
+  if (bends_)
+    terms_.push_back(std::make_unique<SkinBendingTerm>(patches, *pattern_, model.skin.law == SkinLaw::neo_hookean));
   add_contact(model.contact);
   const auto hold_group = [this, &mesh](const FaceGroup& group) {
     for (const int face : group.faces)

@@ -57,6 +57,7 @@ class Mechanics {
   Layout layout_;
   std::shared_ptr<const Pattern> pattern_;
   std::shared_ptr<const Elements> cells_;
+  bool bends_ = false;  // the pattern couples across the edges of the skin
   std::vector<std::unique_ptr<Term>> terms_;
   const VolumeStrainTerm* volume_ = nullptr;     // one of the terms
   const SkinContactTerm* contact_ = nullptr;     // one of the terms, if any

@@ -79,6 +79,8 @@ struct Model {
     /// Skin and cut fade over so much where the skin ends, mm, >= 0 (terms/skin_end_fade.h); 0: at full stiffness up to
     /// it. What the body goes on with, no belief, so it is not calibrated.
     double fade_mm = 0;
+    /// Share of the bending stiffness of a plate of the skin's thickness, >= 0 (terms/skin_bending.h); not calibrated.
+    double bending_share = 0;
   } skin;
   struct {
     InterfaceKind kind = InterfaceKind::sliding;

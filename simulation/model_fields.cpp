@@ -62,6 +62,11 @@ Fields<Dual> base_fields(const Model& model, const Scene& scene, const Eigen::Ve
   fields.cut_stiffness = constant(layout.cut.q.rows(), number("cut.stiffness_kpa_per_mm"));
   fields.stiffening = fields.fibre_modulus = constant(cells, Dual(0.0));
   fields.skin_stiffening = constant(skin, Dual(0.0));
+  // A plate's E h³/12(1 − ν²) over E h; the neo-Hookean skin is incompressible.
+  const Dual thickness = number("skin.thickness_mm"),
+             ratio = model.skin.law == SkinLaw::corotational ? number("skin.poisson_ratio") : Dual(0.5);
+  fields.skin_bending =
+      constant(skin, model.skin.bending_share * thickness * thickness / (12.0 * (1.0 - ratio * ratio)));
   fields.skin_traction = constant(3 * skin, Dual(0.0));
   fields.interface_friction = fields.muscle_offset = constant(contact, Dual(0.0));
   fields.imaged_offset = constant(3 * scene.mesh.points.rows(), Dual(0.0));

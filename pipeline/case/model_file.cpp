@@ -135,7 +135,10 @@ void read_choices(const TomlReader& file, Model& model) {
   read_choice<InterfaceKind>(file.sub_table("interface"), "kind", interface_kinds(), model.interface.kind);
   read_choice<CutKind>(file.sub_table("cut"), "kind", {{"elastic", CutKind::elastic}, {"held", CutKind::held}},
                        model.cut.kind);
-  if (skin) model.skin.fade_mm = skin->number("fade_mm", {.lower = 0, .upper = longest_skin_fade_mm}).value_or(0);
+  if (skin) {
+    model.skin.fade_mm = skin->number("fade_mm", {.lower = 0, .upper = longest_skin_fade_mm}).value_or(0);
+    model.skin.bending_share = skin->number("bending_share", {.lower = 0, .upper = most_skin_bending}).value_or(0);
+  }
 }
 
 /// "section" and "key" of a base row.
@@ -146,7 +149,7 @@ std::pair<std::string, std::string> split_name(const std::string& name) {
 
 void check_base_keys(const TomlReader& file) {
   std::map<std::string, std::vector<std::string>> known = {{"breast", {"law", "density_refers_to", "volumetric"}},
-                                                           {"skin", {"law", "compression", "fade_mm"}},
+                                                           {"skin", {"law", "compression", "fade_mm", "bending_share"}},
                                                            {"interface", {"kind"}},
                                                            {"cut", {"kind"}}};
   for (const Parameter& row : simulation::base_parameters()) {

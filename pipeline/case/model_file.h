@@ -11,6 +11,8 @@ namespace supine::pipeline {
 
 /// Upper bound of [skin] fade_mm.
 inline constexpr double longest_skin_fade_mm = 50;
+/// The same of [skin] bending_share.
+inline constexpr double most_skin_bending = 1000;
 
 /// What stands in a model.toml, or is to stand there.
 struct ModelText {

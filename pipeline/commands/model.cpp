@@ -92,6 +92,8 @@ class ModelTool : public Tool {
                           row.lower, row.upper, row.meaning));
     run.say(fmt::format("    {:<36}{:<9}range {:>8} to {:<8} {}", "skin.fade_mm", "mm", 0, longest_skin_fade_mm,
                         "length over which skin and cut fade out where the skin ends; fixed"));
+    run.say(fmt::format("    {:<36}{:<9}range {:>8} to {:<8} {}", "skin.bending_share", "", 0, most_skin_bending,
+                        "of the bending stiffness of a plate as thick as the skin; fixed"));
     run.say("Effects (at null an effect leaves the model unchanged)");
     for (const simulation::Effect* effect : simulation::catalogue()) {
       run.say(fmt::format("  {}: {}", effect->name(), effect->meaning()));
@@ -113,6 +115,7 @@ class ModelTool : public Tool {
       if (simulation::why_not_of(model, row.name).empty())
         say(row.name.c_str(), simulation::base_setting(model, row.name));
     run.say(fmt::format("  {:<36}{}", "skin.fade_mm", model.skin.fade_mm));
+    run.say(fmt::format("  {:<36}{}", "skin.bending_share", model.skin.bending_share));
     if (model.contact.kind != simulation::ContactKind::off) {
       run.say(model.contact.kind == simulation::ContactKind::skin ? "contact of skin with skin"
               : model.contact.kind == simulation::ContactKind::chest

@@ -7,17 +7,27 @@ namespace supine::simulation {
 
 namespace {
 
-std::vector<std::vector<int>> nodes_that_share(const Indices& cells, Eigen::Index nodes) {
-  std::vector<std::vector<int>> adjacent(nodes);
+using Adjacent = std::vector<std::vector<int>>;
+
+void couple(const Indices& cells, Adjacent& adjacent) {
   for (Eigen::Index c = 0; c < cells.rows(); ++c)
     for (Eigen::Index a = 0; a < cells.cols(); ++a)
       for (Eigen::Index b = 0; b < cells.cols(); ++b) adjacent[cells(c, a)].push_back(cells(c, b));
+}
+
+Adjacent nodes_that_share(const Indices& cells, const Indices& more, Eigen::Index nodes) {
+  Adjacent adjacent(nodes);
+  couple(cells, adjacent);
+  couple(more, adjacent);
   return adjacent;
 }
 
 }  // namespace
 
-Pattern::Pattern(const Indices& cells, Eigen::Index nodes) : Pattern(nodes_that_share(cells, nodes)) {}
+Pattern::Pattern(const Indices& cells, Eigen::Index nodes) : Pattern(cells, Indices(), nodes) {}
+
+Pattern::Pattern(const Indices& cells, const Indices& more, Eigen::Index nodes)
+    : Pattern(nodes_that_share(cells, more, nodes)) {}
 
 Pattern::Pattern(std::vector<std::vector<int>> adjacent)
     : nodes_(static_cast<Eigen::Index>(adjacent.size())), first_(nodes_ + 1, 0) {

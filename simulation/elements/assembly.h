@@ -19,6 +19,8 @@ class Pattern {
  public:
   /// @param cells  #C by nodes per cell, in [0, nodes)   @param nodes  of the mesh
   Pattern(const Indices& cells, Eigen::Index nodes);
+  /// The same, with the nodes of each row of @p more coupled as well.
+  Pattern(const Indices& cells, const Indices& more, Eigen::Index nodes);
   /// @param adjacent  for each node those it is coupled with, in any order and as often as they like; symmetric
   explicit Pattern(std::vector<std::vector<int>> adjacent);
 

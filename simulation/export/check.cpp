@@ -109,6 +109,8 @@ void check_exportable(Solver solver, const meshing::TetMesh& mesh, const meshing
     refuse(words, "[contact] (skin on smooth surfaces: skin or chest)", "leave the table out of the model");
   if (model.skin.fade_mm > 0)
     refuse(words, "skin.fade_mm (skin and cut that fade where the skin ends)", "leave the key out of the model");
+  if (model.skin.bending_share > 0)
+    refuse(words, "skin.bending_share (skin that resists bending)", "leave the key out of the model");
   check_model(words, model);
   const Layout layout = make_layout(mesh, anatomy);
   for (const PoseLoad& pose : poses) check_fields(words, model, {mesh, anatomy, layout, pose.name}, pose.gravity);

@@ -116,8 +116,9 @@ TEST(PhantomTool, PopulationIsSaidInTheAnswer) {
   const Finished made = phantom(folder / "wide/case-001", {"--seed", "4", "--population", "volunteers", "--realistic"});
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_EQ(read_text(folder / "wide/case-001/case.toml"), read_text(plain / "case.toml"));
-  EXPECT_EQ(read_text(folder / "wide/case-001/model.toml"),
-            read_text(plain / "model.toml") + "[contact]\nkind = \"chest\"\n");
+  std::string model = read_text(plain / "model.toml") + "[contact]\nkind = \"chest\"\n";
+  model.insert(model.find("[interface]"), "bending_share = 3\n");
+  EXPECT_EQ(read_text(folder / "wide/case-001/model.toml"), model);
   const Json answer = Json::parse(read_text(folder / "wide/answers/case-001.json"));
   EXPECT_EQ(answer["population"], "volunteers");
   EXPECT_EQ(answer["drawn"], "realistic");

@@ -141,6 +141,13 @@ TEST_F(ModelFile, SkinFadesOverALengthIfThatIsAskedFor) {
   EXPECT_THROW(read("[cut]\nfade_mm = 5\n"), InputError);
 }
 
+TEST_F(ModelFile, SkinResistsBendingIfThatIsAskedFor) {
+  EXPECT_EQ(read("[skin]\nlaw = \"neo_hookean\"\n").skin.bending_share, 0);
+  EXPECT_EQ(read("[skin]\nbending_share = 1.5\n").skin.bending_share, 1.5);
+  EXPECT_THROW(read("[skin]\nbending_share = -1\n"), InputError);
+  EXPECT_THROW(read("[skin]\nbending_share = 1001\n"), InputError);
+}
+
 TEST_F(ModelFile, ContactIsOffUnlessItIsAskedFor) {
   EXPECT_EQ(read(good).contact.kind, simulation::ContactKind::off);
   const auto said = read(good + "[contact]\nkind = \"skin\"\nstiffness_kpa_per_mm = 3.5\nband_mm = 0.7\n").contact;

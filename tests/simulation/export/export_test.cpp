@@ -180,6 +180,9 @@ TEST(SecondOpinion, RefusesWhatTheOtherSolverHasNoWordsFor) {
   Model fading = febio;
   fading.skin.fade_mm = 10;
   expect_words(refusal(Solver::febio, fading), {"FEBio", "skin.fade_mm"});
+  Model bending = febio;
+  bending.skin.bending_share = 1;
+  expect_words(refusal(Solver::febio, bending), {"FEBio", "skin.bending_share"});
   expect_words(refusal(Solver::febio, exportable(BulkLaw::neo_hookean, true, SkinLaw::corotational)),
                {"skin.law = \"corotational\"", "neo_hookean"});
 }

@@ -53,6 +53,18 @@ INSTANTIATE_TEST_SUITE_P(All, ChainTest,
                                            Case{1, BulkLaw::corotational_qr, SkinLaw::corotational, 1.0},
                                            Case{2, BulkLaw::neo_hookean, SkinLaw::neo_hookean, 0.8}));
 
+TEST(Chain, RoundTripOfAStiffSkinReturnsToTheImagedShape) {
+  for (const int order : {1, 2}) {
+    const testing::TestScene& scene = testing::dome_scene(order);
+    Model model = testing::soft_model();
+    const Points limp = solve_chain(scene.mesh, scene.anatomy, model, dome_poses).poses[0].x;
+    model.skin.bending_share = 300;
+    const ChainSolution stiff = solve_chain(scene.mesh, scene.anatomy, model, dome_poses);
+    EXPECT_LE(stiff.round_trip_max_mm, 1e-6);
+    EXPECT_GT((stiff.poses[0].x - limp).rowwise().norm().maxCoeff(), 0.5);
+  }
+}
+
 TEST(Chain, ReversedGravityIsNotTheInverseAndFixedPointIs) {
   const testing::TestScene& scene = testing::dome_scene();
   const Model model = testing::soft_model();
@@ -67,10 +79,12 @@ TEST(Chain, ReversedGravityIsNotTheInverseAndFixedPointIs) {
 
 TEST(Chain, TurningEverythingTurnsTheAnswer) {
   BoxChain chain;
+  chain.model.skin.bending_share = 100;
   const ChainSolution straight = chain.solve();
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
   const Eigen::Vector3d shift(120, -40, 15);
   BoxChain other;
+  other.model = chain.model;
   other.scene.mesh = testing::moved(chain.scene.mesh, turn, shift);
   auto& anatomy = other.scene.anatomy;
   anatomy.outward = turn * anatomy.outward;
@@ -87,6 +101,7 @@ TEST(Chain, TurningEverythingTurnsTheAnswer) {
 
 TEST(Chain, ScaledBodyWithScaledStiffnessGivesTheScaledAnswer) {
   BoxChain small, large;
+  small.model.skin.bending_share = large.model.skin.bending_share = 100;
   const double k = 2;
   large.scene = testing::box_scene(3, {60 * k, 60 * k, 30 * k});
   large.model.breast.young_modulus_kpa.value *= k;

@@ -152,12 +152,14 @@ TEST_P(SensitivitiesTest, ManyAtATimeAreThoseOneByOne) {
   EXPECT_LT((moved[1] + 2 * moved[0]).norm(), 1e-10 * moved[0].norm());
 }
 
-TEST_P(SensitivitiesTest, HoldsWithATensionFieldToo) {
+TEST_P(SensitivitiesTest, HoldsWithSkinThatWrinklesAndBendsToo) {
   model.skin.compression = Compression::tension_field;
+  model.skin.bending_share = 100;
   Chain wrinkling(scene.mesh, scene.anatomy, model, poses);
   const ChainSolution base = wrinkling.solve(model);
   const Sensitivities sensitivities(wrinkling, model, base);
-  for (const std::string name : {"breast.young_modulus_kpa", "skin.young_modulus_kpa", "skin.compression_share"}) {
+  for (const std::string name :
+       {"breast.young_modulus_kpa", "skin.young_modulus_kpa", "skin.thickness_mm", "skin.compression_share"}) {
     const Eigen::VectorXd slope = stacked(sensitivities.of(name));
     const double h = 1e-3 / slope.cwiseAbs().maxCoeff(), at = value_of(name);
     const Eigen::VectorXd ahead = stacked(wrinkling.solve(with(model, name, at + h), &base));

@@ -26,6 +26,7 @@ struct Case {
   DensityReference density;
   double poisson = 0.45;
   double fade_mm = 0;
+  double bending_share = 0;
 };
 
 testing::TestScene small_box(int order) {
@@ -47,6 +48,7 @@ class TermsTest : public ::testing::TestWithParam<Case> {
     model = testing::soft_model(GetParam().law, GetParam().skin);
     model.skin.compression = GetParam().compression;
     model.skin.fade_mm = GetParam().fade_mm;
+    model.skin.bending_share = GetParam().bending_share;
     model.breast.density_refers_to = GetParam().density;
     model.breast.poisson_ratio.value = GetParam().poisson;
     model.breast.yeoh_c3_ratio.value = 0.3;
@@ -97,6 +99,7 @@ class TermsTest : public ::testing::TestWithParam<Case> {
              model.breast.law == BulkLaw::gent;
     if (field == "law_shape_2") return model.breast.law == BulkLaw::yeoh;
     if (field == "skin_poisson") return model.skin.law == SkinLaw::corotational;
+    if (field == "skin_bending") return model.skin.bending_share > 0;
     if (field == "skin_stiffening") return model.skin.law == SkinLaw::neo_hookean;
     if (field == "imaged_offset") return model.breast.density_refers_to == DensityReference::imaged;
     if (field == "skin_compression") return model.skin.compression == Compression::tension_field;
@@ -306,6 +309,12 @@ INSTANTIATE_TEST_SUITE_P(
         Case{2, BulkLaw::yeoh, SkinLaw::neo_hookean, Compression::full, DensityReference::undeformed},
         Case{1, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged, 0.45, 20},
         Case{2, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged, 0.45, 20},
+        // Skin that resists bending, stiffer than skin is: 1.5 mm thick it would hardly be seen beside the rest.
+        Case{1, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::tension_field, DensityReference::imaged, 0.45,
+             0, 500},
+        Case{2, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged, 0.45, 0, 500},
+        Case{2, BulkLaw::corotational, SkinLaw::corotational, Compression::full, DensityReference::imaged, 0.45, 0,
+             500},
         // Nearly incompressible: the mean dilation of each cell carries most of λ.
         Case{2, BulkLaw::neo_hookean, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged, 0.49},
         Case{2, BulkLaw::mooney_rivlin, SkinLaw::neo_hookean, Compression::full, DensityReference::imaged, 0.49},
