@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: AGPL-3.0-or-later
-"""What a mesh errs by with and without [skin] fade_mm: each model solved on the mesh of a case and on that with every
-cell cut into eight (bench_split_mesh), and how far supine nodes of the first lie from there. Some minutes a model.
-Needs the Python VTK (python3-vtk9)."""
+"""What a mesh errs by with a number of [skin], fade_mm or bending_share: each model solved on the mesh of a case and on
+that with every cell cut into eight (bench_split_mesh), and how far supine nodes of the first lie from there. Some
+minutes a model. Needs the Python VTK (python3-vtk9)."""
 
 import argparse
 import os
@@ -43,23 +43,24 @@ def main():
     parser.add_argument("mesh", type=pathlib.Path)
     parser.add_argument("model", type=pathlib.Path)
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/bin"))
-    parser.add_argument("--fade-mm", type=float, nargs="+", default=[0, 10])
+    parser.add_argument("--key", choices=["fade_mm", "bending_share"], default="bending_share")
+    parser.add_argument("--values", type=float, nargs="+", default=[0, 1])
     asked = parser.parse_args()
     asked.work.mkdir(parents=True, exist_ok=True)
     finer = asked.work / "finer.vtu"
     run(asked.bin / "bench_split_mesh", asked.mesh, finer)
     rows = of_mesh(nodes(asked.mesh), nodes(finer))
-    print("| fade_mm | way, rms mm | off, rms mm | off along the way |\n|---|---|---|---|")
-    for fade in asked.fade_mm:
-        model = asked.work / f"fade-{fade:g}.toml"
-        plain = re.sub(r"(?m)^fade_mm = .*\n", "", asked.model.read_text())
-        text, found = re.subn(r"(?m)^\[skin\].*$", f"[skin]\nfade_mm = {fade:g}", plain)
+    print(f"| {asked.key} | way, rms mm | off, rms mm | off along the way |\n|---|---|---|---|")
+    for value in asked.values:
+        model = asked.work / f"{asked.key}-{value:g}.toml"
+        plain = re.sub(rf"(?m)^{asked.key} = .*\n", "", asked.model.read_text())
+        text, found = re.subn(r"(?m)^\[skin\].*$", f"[skin]\n{asked.key} = {value:g}", plain)
         if found != 1:
             raise SystemExit(f"{asked.model}: one table [skin] is needed, there are {found}")
         model.write_text(text)
         way = {}
         for name, mesh in (("mesh", asked.mesh), ("finer", finer)):
-            out = asked.work / f"{name}-{fade:g}"
+            out = asked.work / f"{name}-{asked.key}-{value:g}"
             shutil.rmtree(out, ignore_errors=True)
             run(asked.bin / "supine-simulate", asked.case, mesh, "--pose", "supine", "--model", model, "-o", out,
                 "--force")
@@ -67,7 +68,7 @@ def main():
         true = way["finer"][rows]
         off = way["mesh"] - true
         rms = [np.sqrt(np.mean(np.sum(x**2, axis=1))) for x in (true, off)]
-        print(f"| {fade:g} | {rms[0]:.1f} | {rms[1]:.2f} | {100 * np.sum(off * true) / np.sum(true * true):+.1f} % |",
+        print(f"| {value:g} | {rms[0]:.1f} | {rms[1]:.2f} | {100 * np.sum(off * true) / np.sum(true * true):+.1f} % |",
               flush=True)
 
 
