@@ -141,7 +141,7 @@ std::vector<std::string> calibration_remarks(const FreeParameters& parameters, c
   };
   const simulation::Model model = parameters.model(result.fit.u);
   const double modulus = model.skin.young_modulus_kpa.value, thickness = model.skin.thickness_mm.value;
-  if (modulus > 0)
+  if (modulus > 0 && model.skin.bending_share == 0)
     remarks.push_back(fmt::format(
         "the skin enters as modulus × thickness only: {:.4g} kPa × {:.4g} mm = {:.4g} kPa mm{}", modulus, thickness,
         modulus * thickness,
