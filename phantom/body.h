@@ -14,6 +14,10 @@ namespace supine::phantom {
 /// w = muscle_height(u, v). The footprint is a disc (x, y), |x, y| <= 1, stretched to reach × foot_radius(azimuth).
 /// Thickness over the muscle, along its normal, is rim_mm + (height_mm - rim_mm) (1 - t²)^sharpness inside the foot
 /// (t = distance from the centre in foot radii), rim_mm outside.
+/// skin.bending_share of bodies of real size, in truth and in the model they come with: their wrinkles are then several
+/// elements long.
+inline constexpr double real_size_bending_share = 3;
+
 struct Body {
   std::string side;                               ///< left, right
   double foot_radius_mm;                          ///< mean

@@ -88,7 +88,8 @@ tangential_kpa_per_mm = 0.01
 kind = "elastic"
 stiffness_kpa_per_mm = 1.0
 {})",
-                     real_size ? "bending_share = 3\n" : "", real_size ? contact_text : "");
+                     real_size ? fmt::format("bending_share = {:g}\n", real_size_bending_share) : "",
+                     real_size ? contact_text : "");
 }
 
 // One gzip member without name or time.

@@ -41,7 +41,7 @@ simulation::Model truth_model(const Body& body) {
   model.skin.young_modulus_kpa.value = body.skin_kpa;
   if (body.real_size) {
     model.contact.kind = simulation::ContactKind::chest;
-    model.skin.bending_share = 3;
+    model.skin.bending_share = real_size_bending_share;
   }
   return model;
 }

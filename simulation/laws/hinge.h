@@ -27,7 +27,7 @@ T bend(const Hinge<T>& h) {
   return 2.0 * n.cross(m).dot(h.edge) / (h.edge.norm() * (n.norm() * m.norm() + n.dot(m)));
 }
 
-/// ∂bend/∂(node), one row per node: edge, first, second triangle. ∂θ/∂(third node) is −|edge| n/|n|² with n the
+/// ∂bend/∂(node), 1/mm, one row per node: edge, first, second triangle. ∂θ/∂(third node) is −|edge| n/|n|² with n the
 /// triangle's first_normal() or second_normal(); the edge's nodes balance force and moment (Bridson et al. 2003).
 template <class T>
 Eigen::Matrix<T, 4, 3> bend_gradient(const Hinge<T>& h) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 
 namespace supine::simulation {
 
@@ -11,7 +12,8 @@ namespace supine::simulation {
 /// edge turned by 90° and A the area (Grinspun, Gingold, Reisman and Zorin 2006), the energy
 /// A D/2 [(1 − ν) tr Λ² + ν tr² Λ]. Exact for constant curvature on regular meshes.
 /// @param first, second  ways from the triangle's first node to its others in the undeformed shape, mm
-/// @return K / D, row and column i of the edge from node i to node i + 1
+/// @param poisson  ν of the plate
+/// @return K / D, without unit, row and column i of the edge from node i to node i + 1
 template <class T>
 Eigen::Matrix<T, 3, 3> triangle_bending(const Eigen::Matrix<T, 3, 1>& first, const Eigen::Matrix<T, 3, 1>& second,
                                         const T& poisson) {

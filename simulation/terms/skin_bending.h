@@ -27,7 +27,8 @@ TrianglePatches triangle_patches(const Indices& faces);
 /// tissue under it, crease on the scale of one element.
 class SkinBendingTerm : public Term {
  public:
-  /// @param patches  of the skin's faces, in the order of Fields   @param pattern  couples each patch's nodes
+  /// @param patches         of the skin's faces, in the order of Fields   @param pattern  couples each patch's nodes
+  /// @param incompressible  ν is ½; else that of Fields::skin_poisson
   SkinBendingTerm(TrianglePatches patches, const Pattern& pattern, bool incompressible);
 
   void set_fields(const Fields<double>& fields) override;
@@ -42,8 +43,9 @@ class SkinBendingTerm : public Term {
   template <class T>
   Plate<T> plate(const Fields<T>& fields, int triangle) const;
   Hinge<double> hinge(int triangle, int edge, const Points& points) const;
+  /// About the edges of a triangle, 0 where there is no neighbour. @param points  #N by 3, mm
   Eigen::Vector3d bends(int triangle, const Points& points) const;
-  /// ∂bends/∂(nodes), one column per edge, zero where there is no neighbour.
+  /// ∂bends/∂(nodes), 1/mm, one column per edge, zero where there is no neighbour.
   Eigen::Matrix<double, 18, 3> bend_gradients(int triangle, const Points& points) const;
   void add_triangle(int triangle, const State& state, const Demand& demand, Local<6>& local) const;
 

@@ -7,6 +7,8 @@
 #include <functional>
 #include <numbers>
 
+#include "simulation/model_fields.h"
+#include "tests/simulation/scene.h"
 #include "tests/support/taylor.h"
 
 namespace supine::simulation {
@@ -53,10 +55,11 @@ Sheet sheet(int n, int order = 1, double shift = 0) {
 using Motion = std::function<Eigen::RowVector3d(const Eigen::RowVector3d&)>;
 
 /// Energy of the sheet in its moved shape, in units of D × area.
-double energy(const Sheet& sheet, const Motion& motion) {
+/// @param incompressible  ν is ½, else 0.3
+double energy(const Sheet& sheet, const Motion& motion, bool incompressible = true) {
   const TrianglePatches patches = triangle_patches(sheet.faces);
   const Pattern pattern(sheet.faces, patches.nodes, sheet.points.rows());
-  SkinBendingTerm term(patches, pattern, true);
+  SkinBendingTerm term(patches, pattern, incompressible);
   Fields<double> fields;
   fields.skin_modulus = Eigen::VectorXd::Constant(sheet.faces.rows(), modulus_kpa_mm);
   fields.skin_bending = Eigen::VectorXd::Constant(sheet.faces.rows(), bending_mm2);
@@ -141,6 +144,29 @@ TEST(SkinBending, ASheetRolledToAQuarterOfACylinderHoldsHalfTheSquareOfItsCurvat
     return {radius_mm * std::sin(angle), p.y(), radius_mm * (1 - std::cos(angle))};
   };
   EXPECT_NEAR(energy(sheet(40), roll) * 2 * radius_mm * radius_mm, 1, 0.04);
+}
+
+TEST(SkinBending, HasTheRatioOfTheSkinWhereThatIsNotIncompressible) {
+  const Motion dome = [](const Eigen::RowVector3d& p) -> Eigen::RowVector3d {
+    return p + Eigen::RowVector3d(0, 0, 0.5 * slight * p.squaredNorm());
+  };
+  // A dome of curvature κ holds D (1 + ν) κ² per area.
+  EXPECT_NEAR(energy(sheet(80), dome, false) / (1.3 * slight * slight), 1, 0.05);
+  EXPECT_NEAR(energy(sheet(80), dome, true) / (1.5 * slight * slight), 1, 0.05);
+}
+
+TEST(SkinBending, StiffnessIsThatOfAPlateOfTheSkinsThickness) {
+  const testing::TestScene scene = testing::box_scene(2, {60, 50, 40});
+  const Layout layout = make_layout(scene.mesh, scene.anatomy);
+  const auto stiffness_mn_mm = [&](SkinLaw law) {
+    Model model = testing::soft_model(BulkLaw::neo_hookean, law);
+    model.skin.young_modulus_kpa.value = 20, model.skin.thickness_mm.value = 3, model.skin.bending_share = 2;
+    model.skin.poisson_ratio.value = 0.3;
+    const auto fields = make_fields(model, {scene.mesh, scene.anatomy, layout, "prone"}, Eigen::Vector3d::UnitZ());
+    return (fields.skin_modulus[0] * fields.skin_bending[0]).a;
+  };
+  EXPECT_NEAR(stiffness_mn_mm(SkinLaw::neo_hookean), 2 * 20 * 27 / 9.0, 1e-9);
+  EXPECT_NEAR(stiffness_mn_mm(SkinLaw::corotational), 2 * 20 * 27 / (12 * 0.91), 1e-9);
 }
 
 TEST(SkinBending, PatchesKnowTheirNeighboursAndTheEndOfTheSkin) {
