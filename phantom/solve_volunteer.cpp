@@ -17,7 +17,7 @@ constexpr int stiffer_tries = 4;
 constexpr double stiffer = 1.5;
 constexpr double close_enough = 0.03;  // of the way the nipple is to move
 constexpr int most_solves = 12;
-constexpr double longest_step = 1.25, shortest_step = 1.02;         // factors of the moduli: softer shapes are followed
+constexpr double longest_step = 1.25, shortest_step = 1.05;         // factors of the moduli: softer shapes are followed
 constexpr double usual_slope = -1, steepest = -4, flattest = -0.3;  // of ln way over ln factor
 
 class Search {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "phantom/truth.h"
 
+#include <fmt/format.h>
+
+#include "common/error.h"
 #include "simulation/catalogue.h"
 #include "simulation/model_fields.h"
 #include "simulation/parameters.h"
 #include "simulation/solve/equilibrium.h"
-#include "simulation/solve/turning.h"
 
 namespace supine::phantom {
 namespace {
@@ -69,31 +71,29 @@ const simulation::Mechanics& Truth::in(const TruthPose& pose) {
   return mechanics_;
 }
 
-/// Follows the body from the shape of one pose to that of another as gravity turns. @return false: the way ends before
-bool Truth::turn_over(simulation::EquilibriumSolver& solver, const TruthPose& from, TruthPose& pose) {
-  const auto load = [this, &pose](const Eigen::Vector3d& gravity) { in({pose.name, gravity, {}}); };
-  const simulation::Turn turn = simulation::turn_of(body_mesh_.anatomy, from.gravity, pose.gravity);
-  pose.x = from.x;
-  return simulation::turn_over(solver, turn, load, body_mesh_.mesh.points, pose.x, from.name + " → " + pose.name)
-      .has_value();
+/// From a shape of the pose that other moduli have.
+void Truth::follow(simulation::EquilibriumSolver& solver, TruthPose& pose) const {
+  if (!solver.forward_from(body_mesh_.mesh.points, pose.x, pose.name))
+    throw NumericalFailure(
+        fmt::format("{}: no equilibrium beside that of stiffer tissue, at {:.3g} kPa and a skin of {:.3g} kPa",
+                    pose.name, body_.breast_kpa, body_.skin_kpa));
 }
 
 void Truth::solve(std::vector<TruthPose>& poses, Start start) {
+  // Breasts of real size are looked for among moduli that carry none, so a failure may not cost many times a success.
+  constexpr int work_at_real_size = 250;
   simulation::SolveOptions options;
   options.step_tolerance_mm = 1e-6;
   options.residual_tolerance = 1e-9;
+  if (body_.real_size) options.most_work = work_at_real_size;
   simulation::EquilibriumSolver solver(mechanics_, options);
   for (TruthPose& pose : poses) {
     in(pose);
     solver.forget();
-    const Points near = pose.x;
-    try {
-      solver.forward(body_mesh_.mesh.points, pose.x, "undeformed → " + pose.name,
-                     start == Start::shapes ? &near : nullptr);
-    } catch (const simulation::NoEquilibrium&) {
-      // Other populations stay what they were.
-      if (!body_.real_size || &pose == &poses.front() || !turn_over(solver, poses.front(), pose)) throw;
-    }
+    if (start == Start::shapes)
+      follow(solver, pose);
+    else
+      solver.forward(body_mesh_.mesh.points, pose.x, "undeformed → " + pose.name);
   }
 }
 

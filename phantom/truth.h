@@ -40,12 +40,13 @@ class Truth {
   const simulation::Mechanics& in(const TruthPose& pose);
   enum class Start { no_load, shapes };
   /// Lets the body hang prone and lie in the other poses: one forward solve each.
-  /// @param start  from no load, or from the shapes that the poses have
+  /// @param start  from no load, or beside the shapes that the poses have, no further than Newton's method comes from
+  ///   there at once
   /// @throws NumericalFailure  no equilibrium
   void solve(std::vector<TruthPose>& poses, Start start = Start::no_load);
 
  private:
-  bool turn_over(simulation::EquilibriumSolver& solver, const TruthPose& from, TruthPose& pose);
+  void follow(simulation::EquilibriumSolver& solver, TruthPose& pose) const;
 
   const BodyMesh& body_mesh_;
   const Body& body_;

@@ -123,11 +123,11 @@ Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
   return {.mesh = mechanics.mesh(), .anatomy = mechanics.anatomy(), .layout = mechanics.layout(), .pose = pose};
 }
 
-/// A body that cannot be turned over has the one way, and all the work for it.
+/// A body that can be turned over has two ways to a pose, which share the work; another has the one.
 SolveOptions work_of(SolveOptions options, const PoseLoad& imaged) {
-  constexpr double both_ways = 1.8;
-  if (imaged.name == free_of_load || !(imaged.gravity.norm() > 0))
-    options.most_work = static_cast<int>(both_ways * options.most_work);
+  constexpr double of_two_ways = 0.5, of_one_way = 1.8;
+  const bool turns = imaged.name != free_of_load && imaged.gravity.norm() > 0;
+  options.most_work = static_cast<int>((turns ? of_two_ways : of_one_way) * options.most_work);
   return options;
 }
 
@@ -234,7 +234,8 @@ SolveReport Chain::find_pose(const Model& model, std::size_t pose, const Points*
     x = solution.prone;
     const Turn turn = turn_of(place.mechanics.anatomy(), imaged.gravity, wanted.gravity);
     const std::optional<SolveReport> report =
-        turn_over(place.solver, turn, turned_load, solution.X, x, imaged.name + ", turning, → " + wanted.name);
+        turn_over(place.solver, turn, turned_load, solution.X, x, imaged.name + ", turning, → " + wanted.name,
+                  options_.most_work);
     if (!report) throw;
     return *report;
   }
