@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 #include "simulation/solve/turning.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -44,13 +45,14 @@ Turn turn_of(const meshing::Anatomy& anatomy, const Eigen::Vector3d& from, const
   return {from, to, (way - way.dot(from) * from).normalized()};
 }
 
-std::optional<SolveReport> turn_over(EquilibriumSolver& solver, const Turn& turn,
-                                     const std::function<void(const Eigen::Vector3d& gravity)>& load, const Points& X,
-                                     Points& x, const std::string& what, int most_work) {
+namespace {
+
+std::optional<SolveReport> follow(EquilibriumSolver& solver, const Turn& turn,
+                                  const std::function<void(const Eigen::Vector3d& gravity)>& load, const Points& X,
+                                  Points& x, const std::string& what) {
   SolveReport whole;
   whole.turned = true;
   const double end = turn.angle_deg();
-  const int last_work = solver.work() + most_work;
   double at = 0, step = first_step_deg;
   Points trial;
   while (at < end) {
@@ -72,9 +74,19 @@ std::optional<SolveReport> turn_over(EquilibriumSolver& solver, const Turn& turn
       step = 0.5 * (target - at);
       if (step < least_step_deg) return std::nullopt;
     }
-    if (at < end && solver.work() >= last_work) return std::nullopt;
   }
   return whole;
+}
+
+}  // namespace
+
+std::optional<SolveReport> turn_over(EquilibriumSolver& solver, const Turn& turn,
+                                     const std::function<void(const Eigen::Vector3d& gravity)>& load, const Points& X,
+                                     Points& x, const std::string& what, int most_work) {
+  solver.limit_work(most_work);
+  const std::optional<SolveReport> report = follow(solver, turn, load, X, x, what);
+  solver.limit_work({});
+  return report;
 }
 
 }  // namespace supine::simulation

@@ -35,6 +35,7 @@ Turn turn_of(const meshing::Anatomy& anatomy, const Eigen::Vector3d& from, const
 /// @param x     in: the shape in balance under turn.from; out: that under turn.to
 /// @param what  names the solve
 /// @return steps as load_steps, turned; nothing where the way ends before, or costs more than @p most_work
+/// @post  the solver's work is no longer limited
 std::optional<SolveReport> turn_over(EquilibriumSolver& solver, const Turn& turn,
                                      const std::function<void(const Eigen::Vector3d& gravity)>& load, const Points& X,
                                      Points& x, const std::string& what, int most_work = SolveOptions().most_work);
