@@ -4,7 +4,7 @@
 
 RUN is the finished run of the small case (tests/pipeline/small_case.h). Each row of a table is one wrong input, tried on a copy of it:
 
-    tool | what is changed | exit code | words that the message must hold, parted by ;
+    tool | what is changed | exit code | words that the message (of 0: or standard output) must hold, parted by ;
 
 A tool must end with the code, say `supine-TOOL: error: ` with every word on standard error, and leave no file that was not there.
 README.md says how changes are written.
@@ -211,7 +211,8 @@ def try_row(row, binaries, run):
             wrong.append(f"ended with {ended.returncode}, not {row['code']}")
         if row["code"] and f"supine-{row['tool']}: error: " not in message:
             wrong.append("says no error")
-        wrong += [f"does not say '{word}'" for word in row["words"] if word not in message]
+        told = message if row["code"] else message + ended.stdout.decode(errors="replace")
+        wrong += [f"does not say '{word}'" for word in row["words"] if word not in told]
         if row["code"] in (2, 3) and contents(folder) != before:
             wrong.append(f"left {sorted(map(str, contents(folder).keys() - before.keys()))}")
         return wrong + [message.strip()] if wrong else []
