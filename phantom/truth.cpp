@@ -81,11 +81,10 @@ void Truth::follow(simulation::EquilibriumSolver& solver, TruthPose& pose) const
 
 void Truth::solve(std::vector<TruthPose>& poses, Start start) {
   // Breasts of real size are looked for among moduli that carry none, so a failure may not cost many times a success.
-  constexpr int work_at_real_size = 250;
   simulation::SolveOptions options;
   options.step_tolerance_mm = 1e-6;
   options.residual_tolerance = 1e-9;
-  if (body_.real_size) options.most_work = work_at_real_size;
+  if (body_.real_size) options.most_work /= 2;  // as much as the load steps of a Chain have
   simulation::EquilibriumSolver solver(mechanics_, options);
   for (TruthPose& pose : poses) {
     in(pose);

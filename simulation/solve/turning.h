@@ -38,6 +38,6 @@ Turn turn_of(const meshing::Anatomy& anatomy, const Eigen::Vector3d& from, const
 /// @post  the solver's work is no longer limited
 std::optional<SolveReport> turn_over(EquilibriumSolver& solver, const Turn& turn,
                                      const std::function<void(const Eigen::Vector3d& gravity)>& load, const Points& X,
-                                     Points& x, const std::string& what, int most_work = SolveOptions().most_work);
+                                     Points& x, const std::string& what, int most_work);
 
 }  // namespace supine::simulation

@@ -11,6 +11,7 @@
 #include "common/error.h"
 #include "meshing/surface/triangle_tree.h"
 #include "meshing/topology.h"
+#include "phantom/solve_poses.h"
 #include "phantom/volunteers.h"
 #include "phantom/voxels.h"
 #include "simulation/catalogue.h"
@@ -112,6 +113,27 @@ TEST(Volunteers, ModuliAreScaledUntilTheNippleMovesAsFarAsDrawn) {
     EXPECT_EQ(made.body.height_mm, draw_volunteer(seed).height_mm);
   }
   EXPECT_GE(reached, 3);
+}
+
+// A sixth of the stiffness that carries it, at once.
+TEST(Volunteers, ShapesThatHaveNoneBesideThemAreKept) {
+  PhantomOptions options = coarse(1);
+  options.population = Population::volunteers;
+  Phantom made = make_phantom(options);
+  const BodyMesh body_mesh = mesh_body(made.body, options.seed, options.rings, options.order);
+  const Points supine = made.poses[1].x;
+  const double carried_kpa = made.body.breast_kpa;
+  Body softer = made.body;
+  softer.breast_kpa /= 6, softer.skin_kpa /= 6;
+  try {
+    solve_poses(body_mesh, softer, options, made, Truth::Start::shapes);
+    FAIL() << "it is carried";
+  } catch (const NumericalFailure& failure) {
+    EXPECT_NE(std::string(failure.what()).find("no equilibrium beside that of stiffer tissue"), std::string::npos)
+        << failure.what();
+  }
+  EXPECT_EQ(made.poses[1].x, supine);
+  EXPECT_EQ(made.body.breast_kpa, carried_kpa);
 }
 
 TEST(Motion, IsThatOfAShiftedAndTurnedBody) {
