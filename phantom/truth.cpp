@@ -84,7 +84,7 @@ void Truth::solve(std::vector<TruthPose>& poses, Start start) {
   simulation::SolveOptions options;
   options.step_tolerance_mm = 1e-6;
   options.residual_tolerance = 1e-9;
-  if (body_.real_size) options.most_work /= 2;  // as much as the load steps of a Chain have
+  if (body_.real_size) options.most_work /= 2;
   simulation::EquilibriumSolver solver(mechanics_, options);
   for (TruthPose& pose : poses) {
     in(pose);

@@ -123,15 +123,11 @@ Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
   return {.mesh = mechanics.mesh(), .anatomy = mechanics.anatomy(), .layout = mechanics.layout(), .pose = pose};
 }
 
-/// A body that can be turned over has two ways to a pose, which share the work; another has the one. Steps of a law
-/// without an energy are held by the residual alone, and more of them are needed.
-SolveOptions work_of(SolveOptions options, const PoseLoad& imaged, BulkLaw law) {
-  constexpr double of_two_ways = 0.5, of_one_way = 1.8;
-  const bool turns = imaged.name != free_of_load && imaged.gravity.norm() > 0;
-  if (!turns)
-    options.most_work = static_cast<int>(of_one_way * options.most_work);
-  else if (law != BulkLaw::corotational_qr)
-    options.most_work = static_cast<int>(of_two_ways * options.most_work);
+/// A body that cannot be turned over has the one way, and all the work for it.
+SolveOptions work_of(SolveOptions options, const PoseLoad& imaged) {
+  constexpr double both_ways = 1.8;
+  if (imaged.name == free_of_load || !(imaged.gravity.norm() > 0))
+    options.most_work = static_cast<int>(both_ways * options.most_work);
   return options;
 }
 
@@ -139,7 +135,7 @@ SolveOptions work_of(SolveOptions options, const PoseLoad& imaged, BulkLaw law) 
 
 Chain::Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
              std::vector<PoseLoad> poses, SolveOptions options)
-    : poses_(std::move(poses)), options_(work_of(std::move(options), poses_.at(0), model.breast.law)) {
+    : poses_(std::move(poses)), options_(work_of(std::move(options), poses_.at(0))) {
   const bool apart = omp_get_max_threads() > 1 && mesh.points.size() <= largest_side_by_side;
   workplaces_.resize(apart ? poses_.size() : 1);
   workplaces_[0] = std::make_unique<Workplace>(mesh, anatomy, model, nullptr, options_);

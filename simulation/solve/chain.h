@@ -58,8 +58,6 @@ class Chain {
  public:
   /// @param mesh, anatomy  of the imaged shape; must outlive the object
   /// @param poses  the first one is the imaged pose; at least that. Gravity may be zero in it
-  /// @param options  of most_work a body that can be turned over has half for load steps and half for the turn (with
-  ///   corotational_qr the whole for each), another 1.8 times as much for load steps alone
   /// @throws InputError  the first pose is not anatomy.imaged_pose; prone gravity of a breast that points into the
   /// muscle (bound: the angle to the muscle's outward normal is
   ///   under 90°); what Mechanics refuses

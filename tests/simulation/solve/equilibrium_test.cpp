@@ -208,17 +208,6 @@ TEST(Chain, GivesUpWhereItsWorkIsLimitedAndOnlyThere) {
   EXPECT_EQ(chain.solve(box.model).poses[0].x, free.poses[0].x);
 }
 
-TEST(Chain, TheTwoWaysToAPoseShareWhatASolveMayCost) {
-  const BoxChain box;
-  const auto solved = [&box](int most_work) {
-    Chain chain(box.scene.mesh, box.scene.anatomy, box.model, box_poses, {.most_work = most_work, .progress = {}});
-    return chain.solve(box.model);
-  };
-  const ChainSolution free = solved(SolveOptions().most_work);
-  EXPECT_EQ(solved(2 * free.dearest_solve + 2).poses[0].x, free.poses[0].x);
-  EXPECT_THROW(solved(free.dearest_solve), NoEquilibrium);
-}
-
 TEST(Chain, WorkCountsTheCyclesOfMultigridBesideStepsAndFactors) {
   const auto beside = [](int order) {
     const testing::TestScene& scene = testing::dome_scene(order);
