@@ -191,7 +191,6 @@ Json shape_figures(const CaseInputs& in, const Simulated& simulated, const std::
   f["gravity"] = {gravity.x(), gravity.y(), gravity.z()};
   if (imaged) return f;
   f["second_shape_mm"] = pose->second_shape_mm;
-  if (pose->report.turned) f["turned"] = true;
   if (pose->contact) f["contact"] = contact_figures(*pose->contact);
   if (pose->chest_contact) f["chest_contact"] = contact_figures(*pose->chest_contact);
   return f;
@@ -226,11 +225,6 @@ void say_simulated(const Run& run, const CaseInputs& in, const Simulated& simula
                       "steps", "min det F"));
   row("undeformed", solution.inverse, solution.X);
   for (const PoseSolution& pose : solution.poses) row(pose.name, pose.report, pose.x);
-  for (const PoseSolution& pose : solution.poses)
-    if (pose.report.turned)
-      run.say(
-          fmt::format("  {}: reached by turning the body there from {}; growing gravity alone leads to no equilibrium",
-                      pose.name, imaged));
   const auto touches = [&run](const std::string& pose, const char* what, const simulation::ContactFigures& contact) {
     run.say(fmt::format("  {}: skin presses on {} over {:.1f} cm2, {:.2f} kPa at most, {:.2f} mm deep at most", pose,
                         what, contact.area_cm2, contact.pressure_kpa, contact.overlap_mm));

@@ -15,7 +15,6 @@
 #include "simulation/solve/folds.h"
 #include "simulation/solve/overlap.h"
 #include "simulation/solve/pushed_forward.h"
-#include "simulation/solve/turning.h"
 
 namespace supine::simulation {
 namespace {
@@ -123,19 +122,11 @@ Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
   return {.mesh = mechanics.mesh(), .anatomy = mechanics.anatomy(), .layout = mechanics.layout(), .pose = pose};
 }
 
-/// A body that cannot be turned over has the one way, and all the work for it.
-SolveOptions work_of(SolveOptions options, const PoseLoad& imaged) {
-  constexpr double both_ways = 1.8;
-  if (imaged.name == free_of_load || !(imaged.gravity.norm() > 0))
-    options.most_work = static_cast<int>(both_ways * options.most_work);
-  return options;
-}
-
 }  // namespace
 
 Chain::Chain(const meshing::TetMesh& mesh, const meshing::Anatomy& anatomy, const Model& model,
              std::vector<PoseLoad> poses, SolveOptions options)
-    : poses_(std::move(poses)), options_(work_of(std::move(options), poses_.at(0))) {
+    : poses_(std::move(poses)), options_(std::move(options)) {
   const bool apart = omp_get_max_threads() > 1 && mesh.points.size() <= largest_side_by_side;
   workplaces_.resize(apart ? poses_.size() : 1);
   workplaces_[0] = std::make_unique<Workplace>(mesh, anatomy, model, nullptr, options_);
@@ -203,7 +194,10 @@ PoseSolution Chain::solve_pose(const Model& model, std::size_t pose, const Chain
   Points start;
   if (near != nullptr) start = pushed_forward(mesh.cells, near->poses[pose - 1].x, near->X, solution.X);
   work = within_limit(workplace(pose, model).solver, [&] {
-    found.report = find_pose(model, pose, near != nullptr ? &start : nullptr, solution, found.x);
+    Workplace& place = workplace(pose, model);
+    load(place, model, poses_[pose]);
+    found.report = place.solver.forward(solution.X, found.x, "undeformed → " + poses_[pose].name,
+                                        near != nullptr ? &start : nullptr);
   });
   check_cells(mesh, found.x, solution.X, found.name, found.report);
   return found;
@@ -217,28 +211,6 @@ int Chain::within_limit(EquilibriumSolver& solver, const std::function<void()>& 
   solver.limit_work(most_of_each_);
   solve();
   return solver.work() - before;
-}
-
-/// By growing load; where that leads nowhere, as the patient turns.
-SolveReport Chain::find_pose(const Model& model, std::size_t pose, const Points* start, const ChainSolution& solution,
-                             Points& x) {
-  const PoseLoad& imaged = poses_[0];
-  const PoseLoad& wanted = poses_[pose];
-  Workplace& place = workplace(pose, model);
-  load(place, model, wanted);
-  try {
-    return place.solver.forward(solution.X, x, "undeformed → " + wanted.name, start);
-  } catch (const NoEquilibrium&) {
-    if (most_of_each_ || imaged_free_of_load() || !(imaged.gravity.norm() > 0) || !(wanted.gravity.norm() > 0)) throw;
-    const auto turned_load = [&](const Eigen::Vector3d& gravity) { load(place, model, {wanted.name, gravity}); };
-    x = solution.prone;
-    const Turn turn = turn_of(place.mechanics.anatomy(), imaged.gravity, wanted.gravity);
-    const std::optional<SolveReport> report =
-        turn_over(place.solver, turn, turned_load, solution.X, x, imaged.name + ", turning, → " + wanted.name,
-                  options_.most_work);
-    if (!report) throw;
-    return *report;
-  }
 }
 
 void Chain::certify(const Model& model, ChainSolution& solution) {

@@ -80,7 +80,7 @@ class Chain {
                       InverseMethod method = InverseMethod::newton);
 
   /// EquilibriumSolver::limit_work() of each solve of a chain: a trial of which one costs much more than any of others
-  /// is not worth waiting for, nor for the body to be turned where growing load led nowhere. nullopt = no bound.
+  /// is not worth waiting for. nullopt = no bound.
   void limit_each_solve(std::optional<int> most) { most_of_each_ = most; }
 
   /// Makes the round trip: loads solution.X with the imaged pose's gravity, from no load. Where forces have no energy
@@ -112,8 +112,6 @@ class Chain {
   ChainSolution solve_all(const Model& model, const ChainSolution* near, InverseMethod method);
   PoseSolution solve_pose(const Model& model, std::size_t pose, const ChainSolution* near,
                           const ChainSolution& solution, int& work);
-  SolveReport find_pose(const Model& model, std::size_t pose, const Points* start, const ChainSolution& solution,
-                        Points& x);
   void load(Workplace& place, const Model& model, const PoseLoad& pose) const;
   int within_limit(EquilibriumSolver& solver, const std::function<void()>& solve) const;
   void solve_undeformed(const Model& model, InverseMethod method, const ChainSolution* near, ChainSolution& solution);

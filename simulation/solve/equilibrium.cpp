@@ -237,26 +237,32 @@ std::optional<Termination> EquilibriumSolver::settled(Attempt& attempt, bool by_
   if (share <= options_.residual_tolerance) return Termination::residual_small;
   if (attempt.moved_mm < options_.step_tolerance_mm && direction_->exact() && share <= loosest_residual_share)
     return Termination::step_small;
-  if (creeps(attempt, by_energy)) return Termination::stalled;
-  if (attempt.iterations == options_.max_iterations) return Termination::iteration_limit;
+  if (const auto end = aimless(attempt, by_energy)) return end;
+  if (direction_->exact() && share < arriving_share && share < arriving_fall * attempt.share_before)
+    return std::nullopt;
+  if (attempt.iterations >= options_.max_iterations) return Termination::iteration_limit;
   if (steps_and_factors(steps_, *direction_) >= solve_end_ || work() >= work_end_) return Termination::work_limit;
   return std::nullopt;
 }
 
-/// Whether neither residual nor energy fell much in the window that ends here. The energy of a shape far from the
-/// answer falls for long before the residual does. Of what may cost no more than so much the window is shorter: beside
-/// a fold, where two shapes meet and end, steps grow and the residual stays.
-bool EquilibriumSolver::creeps(Attempt& attempt, bool by_energy) const {
+/// At the end of a window, whether neither residual nor energy fell much in it, or the energy as if without end. The
+/// energy of a shape far from the answer falls for long before the residual does. Of what may cost no more than so much
+/// the window is shorter: beside a fold, where two shapes meet and end, steps grow and the residual stays.
+std::optional<Termination> EquilibriumSolver::aimless(Attempt& attempt, bool by_energy) const {
   const int window = work_end_ == unlimited ? stall_window : short_stall_window;
-  if (attempt.iterations % window != 0) return false;
+  if (attempt.iterations % window != 0) return std::nullopt;
   if (attempt.iterations == 0) attempt.energy_at_start = sums_.energy;
   const double fall = attempt.energy_at_window - sums_.energy, whole = attempt.energy_at_start - sums_.energy;
   const bool falls = by_energy && fall > energy_share * whole && fall > energy_rounding * std::abs(sums_.energy);
-  const bool creeping =
+  const bool creeps =
       attempt.iterations > 0 && !falls && attempt.residual_share > stall_share * attempt.share_at_window;
+  const bool slides =
+      falls && window == stall_window && attempt.iterations > sliding_after && fall > sliding_share * whole;
   attempt.share_at_window = attempt.residual_share;
   attempt.energy_at_window = sums_.energy;
-  return creeping;
+  if (creeps) return Termination::stalled;
+  if (slides) return Termination::sliding;
+  return std::nullopt;
 }
 
 bool EquilibriumSolver::by_energy(const Problem& problem) const {

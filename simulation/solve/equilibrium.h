@@ -15,8 +15,8 @@ namespace supine::simulation {
 class NewtonDirection;
 
 struct SolveOptions {
-  int max_iterations = 50;                ///< Newton steps per load step, >= 0
-  int most_work = 500;                    ///< of one solve: steps and factorisations of EquilibriumSolver::work(), >= 0
+  int max_iterations = 100;               ///< Newton steps per load step, >= 0
+  int most_work = 600;                    ///< of one solve: steps and factorisations of EquilibriumSolver::work(), >= 0
   double step_tolerance_mm = 1e-8;        ///< of Termination::step_small, >= 0
   double residual_tolerance = 1e-11;      ///< of Termination::residual_small, share of the weight, >= 0
   double smallest_load_step = 1.0 / 128;  ///< share of the load, in (0, 1]
@@ -34,6 +34,14 @@ inline constexpr double crushed_det_f = 1e-3;
 inline constexpr int stall_window = 12;
 inline constexpr double stall_share = 0.5;
 inline constexpr double energy_share = 0.02;
+/// A body that finds its balance has lost nearly all of the energy that it will lose after two such windows. One that
+/// slides off goes on losing it: more than this share, in a window, of what it has lost since the load step began.
+inline constexpr int sliding_after = 2 * stall_window;
+inline constexpr double sliding_share = 0.03;
+/// A step of the exact tangent that takes so small a residual to so small a part of it is followed by few more: neither
+/// iterations nor work end a solve there.
+inline constexpr double arriving_share = 1e-3;
+inline constexpr double arriving_fall = 0.1;
 /// A factorisation costs about as much as so many Newton steps without one (linear cells, 10,000 nodes).
 inline constexpr int work_of_factor = 4;
 /// Of a Newton step: where 1/4096 of it is still too long, shorter load steps help more than shorter Newton steps.
@@ -50,9 +58,11 @@ enum class Termination {
   crushed,             ///< 0 < det F < crushed_det_f after a step
   stalled,             ///< |r_k| > stall_share |r_(k - stall_window)| at iteration k, a multiple of stall_window, and
                        ///< W_(k - stall_window) - W_k < energy_share (W_0 - W_k) where the merit is the energy W
-  iteration_limit,     ///< max_iterations steps were taken
+  sliding,             ///< W_(k - stall_window) - W_k > sliding_share (W_0 - W_k) at an iteration k > sliding_after, a
+                       ///< multiple of stall_window, where the merit is the energy W
+  iteration_limit,     ///< max_iterations steps were taken, and the last was not arriving
   singular_tangent,    ///< NewtonDirection found no step
-  work_limit,          ///< more work than SolveOptions::most_work, or than limit_work() leaves
+  work_limit,          ///< the same of SolveOptions::most_work, or of what limit_work() leaves
   line_search_failed,  ///< no 2^-h of the step, h = 0 .. max_halvings, lowers the merit and keeps det F
 };
 
@@ -68,7 +78,6 @@ struct SolveReport {
   double min_det_f = 1;       ///< smallest det F (F = ∂x/∂X) over the quadrature points
   double residual_share = 0;  ///< |r| / |w| at the end, as in Termination; 0 without weight
   Termination termination = Termination::residual_small;  ///< of the last load step: one of the converged
-  bool turned = false;   ///< reached by gravity that turned from another pose (turning.h), in load_steps steps
   int folded_cells = 0;  ///< filled by Chain: quadratic cells inside out between their quadrature points (folds.h)
 };
 
@@ -170,7 +179,7 @@ class EquilibriumSolver {
   void measure(Attempt& attempt) const;
   std::optional<Termination> unusable(const Attempt& attempt) const;
   std::optional<Termination> settled(Attempt& attempt, bool by_energy) const;
-  bool creeps(Attempt& attempt, bool by_energy) const;
+  std::optional<Termination> aimless(Attempt& attempt, bool by_energy) const;
   bool by_energy(const Problem& problem) const;
   bool find_step(const Problem& problem, const Points& sought, Attempt& attempt, Eigen::VectorXd& step);
 

@@ -15,6 +15,11 @@ std::string termination_words(Termination end, int iterations, double residual_s
     case Termination::iteration_limit:
       return fmt::format("no convergence in {} iterations, {:.1e} of the weight out of balance", iterations,
                          residual_share);
+    case Termination::sliding:
+      return fmt::format(
+          "the body slides off: after {} iterations its energy falls as before, {:.1e} of the weight out of "
+          "balance",
+          iterations, residual_share);
     case Termination::work_limit:
       return fmt::format("given up: that costs too much; {:.1e} of the weight out of balance", residual_share);
     case Termination::singular_tangent:

@@ -186,6 +186,31 @@ TEST(Equilibrium, TooFewIterationsAreNamed) {
   }
 }
 
+TEST(Equilibrium, AStepThatIsArrivingIsFollowedByTheNextWhateverTheLimit) {
+  const SolveReport free = forward_box({.progress = {}});
+  const SolveReport short_of_one =
+      forward_box({.max_iterations = free.newton_iterations - 1, .smallest_load_step = 1, .progress = {}});
+  EXPECT_EQ(short_of_one.newton_iterations, free.newton_iterations);
+}
+
+TEST(Equilibrium, ABodyThatSlidesOffIsGivenUpAndSaidTo) {
+  const testing::TestScene& scene = testing::dome_scene(2);
+  Model soft = testing::soft_model();
+  soft.breast.young_modulus_kpa.value = 0.1;
+  soft.skin.young_modulus_kpa.value = 1;
+  const Chain chain(scene.mesh, scene.anatomy, soft, dome_poses);
+  Mechanics mechanics(scene.mesh, scene.anatomy, soft);
+  mechanics.set_fields(values_of(chain.fields(soft, dome_poses[1])));
+  EquilibriumSolver solver(mechanics, {.smallest_load_step = 1, .progress = {}});
+  Points x;
+  try {
+    solver.forward(scene.mesh.points, x, "lying");
+    FAIL() << "this body is carried";
+  } catch (const NoEquilibrium& failure) {
+    EXPECT_NE(std::string(failure.what()).find("slides off"), std::string::npos) << failure.what();
+  }
+}
+
 TEST(Equilibrium, WorkThatCostsTooMuchIsGivenUp) {
   try {
     forward_box({.most_work = 1, .progress = {}});
