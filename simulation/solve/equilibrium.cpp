@@ -238,8 +238,9 @@ std::optional<Termination> EquilibriumSolver::settled(Attempt& attempt, bool by_
   if (attempt.moved_mm < options_.step_tolerance_mm && direction_->exact() && share <= loosest_residual_share)
     return Termination::step_small;
   if (const auto end = aimless(attempt, by_energy)) return end;
-  if (direction_->exact() && share < arriving_share && share < arriving_fall * attempt.share_before)
-    return std::nullopt;
+  const bool arriving = attempt.iterations > 0 && direction_->exact() && share < arriving_share &&
+                        share < arriving_fall * attempt.share_before;
+  if (arriving) return std::nullopt;
   if (attempt.iterations >= options_.max_iterations) return Termination::iteration_limit;
   if (steps_and_factors(steps_, *direction_) >= solve_end_ || work() >= work_end_) return Termination::work_limit;
   return std::nullopt;

@@ -116,7 +116,7 @@ Fit impatient_fit(Trial& trial, int max_iterations) {
 
 TEST(TrustRegion, TakesShorterStepsAfterOnesThatLeadNowhere) {
   Trial trial;
-  const Fit fit = impatient_fit(trial, 2);
+  const Fit fit = impatient_fit(trial, 1);
   EXPECT_TRUE(fit.converged) << fit.message;
   EXPECT_GT(fit.failed, 0);
   EXPECT_NEAR(std::exp(fit.u[0]), 0.9, 5e-3);
