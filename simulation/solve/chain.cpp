@@ -193,8 +193,8 @@ PoseSolution Chain::solve_pose(const Model& model, std::size_t pose, const Chain
   PoseSolution found{.name = poses_[pose].name, .x = {}, .report = {}};
   Points start;
   if (near != nullptr) start = pushed_forward(mesh.cells, near->poses[pose - 1].x, near->X, solution.X);
-  work = within_limit(workplace(pose, model).solver, [&] {
-    Workplace& place = workplace(pose, model);
+  Workplace& place = workplace(pose, model);
+  work = within_limit(place.solver, [&] {
     load(place, model, poses_[pose]);
     found.report = place.solver.forward(solution.X, found.x, "undeformed → " + poses_[pose].name,
                                         near != nullptr ? &start : nullptr);
