@@ -18,7 +18,7 @@
 #   make bench [DATA=dir]            every measurement of docs/verification.md and docs/performance.md: hours, on a quiet machine
 #   make study [DATA=dir]            every table of docs/study.md: an hour or more, on a quiet machine
 #   make hidden [N=60] [SEED=1]      N cases with a sealed answer, each diagnosed from its folder alone; confusion matrix
-#        [REALISTIC=1] [PRIOR=1] [SET=pairs|foreign|doses] [QUARTER=1..4] [SEED_FROM=tag] [ROWS=file]: docs/hidden.md
+#        [REALISTIC=1] [PRIOR=1] [SET=pairs|foreign|doses|large] [QUARTER=1..4] [SEED_FROM=tag] [ROWS=file]: docs/hidden.md
 
 SHELL := /bin/bash
 BUILD ?= build

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: AGPL-3.0-or-later
 """Blind benchmark: makes cases with a sealed answer, diagnoses each from its case folder alone, scores.
 
-    bench/hidden.py WORK --bin build/bin [--realistic | --prior | --set pairs|foreign|doses [--realistic]]
+    bench/hidden.py WORK --bin build/bin [--realistic | --prior | --set pairs|foreign|doses|large [--realistic]]
                     [--cases N] [--seed N | --seed-from TAG] [--quarter 1..4] [--rows FILE] [--first 1] [--jobs 2]
                     [--registration-mm MM] [--no-tilt] [--only odd|even] [--again [--label LABEL] [--without WHAT]]
 
@@ -173,7 +173,7 @@ def parser():
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/bin"))
     parser.add_argument("--realistic", action="store_true", help="with what patients bring; also with --set")
     parser.add_argument("--prior", action="store_true", help="cases from the priors")
-    parser.add_argument("--set", choices=["pairs", "foreign", "doses"], help="a designed set")
+    parser.add_argument("--set", choices=["pairs", "foreign", "doses", "large"], help="a designed set")
     parser.add_argument("--cases", type=int, help="default: as many as the set has, 60 of a mixture")
     parser.add_argument("--first", type=int, default=1, help="number of the first case to run, up to --cases")
     parser.add_argument("--quarter", type=int, choices=[1, 2, 3, 4], help="every fourth case alone")

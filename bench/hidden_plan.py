@@ -110,15 +110,24 @@ def doses(count, seed):
             for body, effect, size in wanted[:count]]
 
 
+def large(count, seed):
+    """Breasts that move as far as volunteers': as many healthy ones as with one effect in sight."""
+    healthy = deck([True, False], seed, "large healthy", count)
+    singles = iter(deck(IN_SIGHT, seed, "large single", count))
+    return [["--seed", str(seed_of(seed, "large", number)), "--population", "volunteers",
+             *(effect_words(["null"]) if null else ["--size", str(PAIR_SIZE), *effect_words([next(singles)])])]
+            for number, null in enumerate(healthy, 1)]
+
+
 # Sets by name, each with the number of cases it has unless told otherwise.
 SETS = {"mixture": (60, mixture), "realistic": (60, realistic), "prior": (120, prior), "pairs": (24, pairs),
-        "foreign": (24, foreign), "doses": (len(DOSED) * len(SIZES) * BODIES, doses)}
+        "foreign": (24, foreign), "doses": (len(DOSED) * len(SIZES) * BODIES, doses), "large": (24, large)}
 
 
 def plan(name, count, seed, with_nuisances=False):
     """(name, options of supine-phantom) of each case. What has been made stays what it is when more are asked for."""
     cases = SETS[name][1](count, seed)
-    more = ["--realistic"] if with_nuisances or name == "realistic" else []
+    more = ["--realistic"] if with_nuisances or name in ("realistic", "large") else []
     return [(f"case-{number:03d}", options + more) for number, options in enumerate(cases, 1)]
 
 

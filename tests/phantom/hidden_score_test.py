@@ -354,6 +354,13 @@ class Plan(unittest.TestCase):
         self.assertEqual(len({words[0] for words in doses}), 5)
         self.assertIn("--realistic", hidden_plan.plan("pairs", 24, 1, True)[0][1])
 
+    def test_large_breasts_bring_what_patients_bring(self):
+        cases = hidden_plan.plan("large", 24, 1)
+        self.assertTrue(all(words.count("--realistic") == 1 and "volunteers" in words for _, words in cases))
+        self.assertEqual(sum("null" in words for _, words in cases), 12)
+        self.assertEqual({word for _, words in cases for word in words if word in hidden_plan.EFFECTS},
+                         set(hidden_plan.IN_SIGHT))
+
     def test_quarters_are_disjoint_and_mixed(self):
         cases = hidden_plan.plan("doses", 45, 1)
         quarters = [hidden_plan.quarter(cases, which) for which in (1, 2, 3, 4)]
