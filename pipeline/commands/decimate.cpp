@@ -19,9 +19,7 @@ namespace fs = std::filesystem;
 using meshing::DecimateResult;
 using reconstruction::region_names;
 
-// Of flat triangles that will be bent (docs/meshing.md): times the bound, for bodies as large as those that the number
-// of triangles was chosen on. On larger ones fewer triangles move the body too far off.
-constexpr double loosest_bent = 2, usual_area_cm2 = 700;
+constexpr double loosest_bent = 2;  // times the bound, of flat triangles that will be bent (docs/meshing.md)
 
 class DecimateTool : public Tool {
  public:
@@ -54,7 +52,7 @@ class DecimateTool : public Tool {
     app.add_option("--max-distance-mm", max_distance_mm_,
                    "bound on the distance to the input, either way, mm, > 0; default: 1, and of a surface of more than "
                    "900 cm2 as much more as it is larger, up to 3; --order 2: twice that where it "
-                   "would take half as many triangles again as are asked for, of a surface of up to 700 cm2");
+                   "would take half as many triangles again as are asked for");
     app.add_option("--faces", options_.target_faces, "instead: about so many quads and lone triangles, >= 50");
     app.add_option("--edge-mm", options_.edge_mm, "instead: edge length, mm, > 0");
     app.add_option("--method", method_, "quads, or triangles of one size")
@@ -80,7 +78,7 @@ class DecimateTool : public Tool {
     follow_body(in, run);
     options_.progress = [&run](const std::string& line) { run.progress(line); };
     if (!finer_.empty()) options_.relative_size = relative_size(in);
-    const bool bent = order_ == 2 && !max_distance_mm_ && area_cm2_ <= usual_area_cm2;
+    const bool bent = order_ == 2 && !max_distance_mm_;
     const double first_mm = options_.max_distance_mm;
     const DecimateResult result = meshing::decimate_within(in, bent ? loosest_bent * first_mm : first_mm, options_);
     if (options_.max_distance_mm > first_mm)
@@ -143,12 +141,12 @@ class DecimateTool : public Tool {
     constexpr double one_breast_cm2 = 900, most = 3;
     // On computed breasts 700 quadratic triangles leave half of the error of 2500 linear ones, docs/meshing.md.
     const double of_one_breast = order_ == 2 ? 700 : 2500;
-    area_cm2_ = reconstruction::check_surface(in).area_mm2 / 100;
-    const double larger = std::clamp(area_cm2_ / one_breast_cm2, 1.0, most);
+    const double area_cm2 = reconstruction::check_surface(in).area_mm2 / 100;
+    const double larger = std::clamp(area_cm2 / one_breast_cm2, 1.0, most);
     options_.target_triangles = triangles_.value_or(static_cast<int>(of_one_breast * larger));
     options_.max_distance_mm = max_distance_mm_.value_or(larger);
     if (larger > 1 && (!triangles_ || !max_distance_mm_))
-      run.say(fmt::format("{:.0f} cm2 of surface: at most {} triangles within {:.2f} mm", area_cm2_,
+      run.say(fmt::format("{:.0f} cm2 of surface: at most {} triangles within {:.2f} mm", area_cm2,
                           options_.target_triangles, options_.max_distance_mm));
   }
 
@@ -194,7 +192,6 @@ class DecimateTool : public Tool {
   std::optional<int> triangles_;
   int order_ = 1;
   std::optional<double> max_distance_mm_;
-  double area_cm2_ = 0;
   std::vector<std::string> finer_;
   meshing::DecimateOptions options_;
 };
