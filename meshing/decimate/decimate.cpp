@@ -141,17 +141,21 @@ DecimateResult decimate(const Surface& in, const DecimateOptions& options) {
   return result;
 }
 
-DecimateResult decimate_within(const Surface& in, double loosest_mm, DecimateOptions& options) {
-  constexpr double grown = 1.5;  // of the number asked for: less of it is worth its nearness
+DecimateResult decimate_within(const Surface& in, const std::vector<double>& looser_mm, DecimateOptions& options) {
+  double grown = 1.5;  // of the number asked for: less of it is worth its nearness
   DecimateResult result = decimate(in, options);
-  const auto triangles = static_cast<double>(result.surface.triangles.rows());
-  if (!(loosest_mm > options.max_distance_mm) || triangles < grown * options.target_triangles) return result;
-  DecimateOptions looser = options;
-  looser.max_distance_mm = loosest_mm;
-  DecimateResult other = decimate(in, looser);
-  if (other.surface.triangles.rows() >= result.surface.triangles.rows()) return result;
-  options = looser;
-  return other;
+  for (const double bound_mm : looser_mm) {
+    const auto triangles = static_cast<double>(result.surface.triangles.rows());
+    if (!(bound_mm > options.max_distance_mm) || triangles < grown * options.target_triangles) return result;
+    DecimateOptions looser = options;
+    looser.max_distance_mm = bound_mm;
+    DecimateResult other = decimate(in, looser);
+    grown = 2;
+    if (other.surface.triangles.rows() >= result.surface.triangles.rows()) continue;
+    options = looser;
+    result = std::move(other);
+  }
+  return result;
 }
 
 }  // namespace supine::meshing

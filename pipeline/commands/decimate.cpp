@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <optional>
+#include <vector>
 
 #include "common/error.h"
 #include "pipeline/tool/tool.h"
@@ -19,7 +20,7 @@ namespace fs = std::filesystem;
 using meshing::DecimateResult;
 using reconstruction::region_names;
 
-constexpr double loosest_bent = 2;  // times the bound, of flat triangles that will be bent (docs/meshing.md)
+constexpr double looser_bent[] = {2, 3};  // times the bound, of flat triangles that will be bent (docs/meshing.md)
 
 class DecimateTool : public Tool {
  public:
@@ -52,7 +53,7 @@ class DecimateTool : public Tool {
     app.add_option("--max-distance-mm", max_distance_mm_,
                    "bound on the distance to the input, either way, mm, > 0; default: 1, and of a surface of more than "
                    "900 cm2 as much more as it is larger, up to 3; --order 2: twice that where it "
-                   "would take half as many triangles again as are asked for");
+                   "would take half as many triangles again as are asked for, three times where that takes twice as many");
     app.add_option("--faces", options_.target_faces, "instead: about so many quads and lone triangles, >= 50");
     app.add_option("--edge-mm", options_.edge_mm, "instead: edge length, mm, > 0");
     app.add_option("--method", method_, "quads, or triangles of one size")
@@ -78,12 +79,14 @@ class DecimateTool : public Tool {
     follow_body(in, run);
     options_.progress = [&run](const std::string& line) { run.progress(line); };
     if (!finer_.empty()) options_.relative_size = relative_size(in);
-    const bool bent = order_ == 2 && !max_distance_mm_;
     const double first_mm = options_.max_distance_mm;
-    const DecimateResult result = meshing::decimate_within(in, bent ? loosest_bent * first_mm : first_mm, options_);
+    std::vector<double> looser_mm;
+    if (order_ == 2 && !max_distance_mm_)
+      for (const double times : looser_bent) looser_mm.push_back(times * first_mm);
+    const DecimateResult result = meshing::decimate_within(in, looser_mm, options_);
     if (options_.max_distance_mm > first_mm)
       run.say(fmt::format(
-          "within {:g} mm many more triangles are needed; within {:g} mm, since the cells are bent onto the "
+          "within {:.3g} mm many more triangles are needed; within {:.3g} mm, since the cells are bent onto the "
           "fine surface",
           first_mm, options_.max_distance_mm));
     run.stage("write");

@@ -91,14 +91,27 @@ TEST(Decimate, TightBoundTakesMoreTrianglesAndSaysSo) {
 TEST(Decimate, ALooserBoundIsTakenWhereTheNumberNeedsIt) {
   const Surface in = ball(40, 5);
   DecimateOptions options{.target_triangles = 200, .max_distance_mm = 0.1};
-  const DecimateResult result = decimate_within(in, 3, options);
+  const DecimateResult result = decimate_within(in, {3}, options);
   EXPECT_TRUE(result.reached_target) << result.reason;
   EXPECT_EQ(options.max_distance_mm, 3);
   expect_promises(in, result, options);
   DecimateOptions enough{.target_triangles = 1500, .max_distance_mm = 1};
-  const DecimateResult first = decimate(in, enough), same = decimate_within(in, 3, enough);
+  const DecimateResult first = decimate(in, enough), same = decimate_within(in, {3}, enough);
   EXPECT_EQ(enough.max_distance_mm, 1) << "what is reached is not loosened";
   EXPECT_EQ(first.surface.points, same.surface.points);
+}
+
+TEST(Decimate, AStillLooserBoundIsTakenWhereTheNumberIsTwiceAsLarge) {
+  const Surface in = ball(40, 5);
+  const DecimateOptions asked{.target_triangles = 200, .max_distance_mm = 0.05};
+  DecimateOptions first = asked, second = asked, enough = asked;
+  const auto close = decimate_within(in, {0.1}, first).surface.triangles.rows();
+  ASSERT_GT(close, 400);
+  const DecimateResult result = decimate_within(in, {0.1, 3}, second);
+  EXPECT_EQ(second.max_distance_mm, 3);
+  EXPECT_TRUE(result.reached_target) << result.reason;
+  decimate_within(in, {2, 3}, enough);
+  EXPECT_EQ(enough.max_distance_mm, 2) << "what is reached is not loosened further";
 }
 
 TEST(Decimate, ABoundThatNoCoarserSurfaceKeepsGivesTheInputBack) {
