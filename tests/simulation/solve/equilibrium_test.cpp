@@ -193,6 +193,23 @@ TEST(Equilibrium, AStepThatIsArrivingIsFollowedByTheNextWhateverTheLimit) {
   EXPECT_EQ(short_of_one.newton_iterations, free.newton_iterations);
 }
 
+TEST(Equilibrium, AStepThatIsArrivingIsFollowedByTheNextWhateverWorkIsLeft) {
+  constexpr int step_and_factor = 5;
+  const testing::TestScene& scene = testing::dome_scene(2);
+  const Model model = testing::soft_model();
+  const Chain chain(scene.mesh, scene.anatomy, model, dome_poses);
+  Mechanics mechanics(scene.mesh, scene.anatomy, model);
+  mechanics.set_fields(values_of(chain.fields(model, dome_poses[1])));
+  const auto work_within = [&](int most) {
+    EquilibriumSolver solver(mechanics, {.most_work = most, .smallest_load_step = 1, .progress = {}});
+    Points x;
+    solver.forward(scene.mesh.points, x, "lying");
+    return solver.work();
+  };
+  const int needed = work_within(SolveOptions().most_work);
+  EXPECT_EQ(work_within(needed - step_and_factor), needed);
+}
+
 TEST(Equilibrium, ABodyThatSlidesOffIsGivenUpAndSaidTo) {
   const testing::TestScene& scene = testing::dome_scene(2);
   Model soft = testing::soft_model();
