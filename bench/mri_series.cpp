@@ -176,7 +176,8 @@ struct Wanted {
 int table(const Wanted& wanted) {
   std::vector<double> breast, gland, volume, wall, wall95, breast95, gland95;
   fmt::print(
-      "| seed | breast Dice | HD95 mm | ml (true) | gland Dice | without ligaments | HD95 mm | ml (true), by share | wall median / 95 % mm "
+      "| seed | breast Dice | HD95 mm | ml (true) | gland Dice | without ligaments | HD95 mm | ml (true), by share | "
+      "wall median / 95 % mm "
       "| doubts |\n"
       "|---|---|---|---|---|---|---|---|---|---|\n");
   int failed = 0;
@@ -190,10 +191,11 @@ int table(const Wanted& wanted) {
       const auto result = segment(made.image, wanted.series == phantom::Series::t1, std::move(second));
       const Score s = score(torso, made, result);
       fmt::print(
-          "| {} | {:.3f} | {:.1f} | {:.0f} ({:.0f}) | {:.3f} | {:.3f} | {:.1f} | {:.0f} ({:.0f}), {:.0f} | {:.1f} / {:.1f} "
+          "| {} | {:.3f} | {:.1f} | {:.0f} ({:.0f}) | {:.3f} | {:.3f} | {:.1f} | {:.0f} ({:.0f}), {:.0f} | {:.1f} / "
+          "{:.1f} "
           "| {} |\n",
-          seed, s.breast, s.breast_hd95, s.breast_ml, s.true_breast_ml, s.gland, s.gland_but_ligaments, s.gland_hd95, s.gland_ml,
-          s.true_gland_ml, s.share_ml, s.wall_median, s.wall_95, s.doubts);
+          seed, s.breast, s.breast_hd95, s.breast_ml, s.true_breast_ml, s.gland, s.gland_but_ligaments, s.gland_hd95,
+          s.gland_ml, s.true_gland_ml, s.share_ml, s.wall_median, s.wall_95, s.doubts);
       breast.push_back(s.breast);
       gland.push_back(s.gland);
       breast95.push_back(s.breast_hd95);

@@ -64,9 +64,9 @@ struct DecimateResult {
 /// @throws InputError  in is not such a surface (names the first place), options out of range
 DecimateResult decimate(const reconstruction::Surface& in, const DecimateOptions& options);
 
-/// The same, and where that takes half as many triangles again as are asked for, within the first of @p looser_mm; where
-/// that takes twice as many, within the next. For a surface whose cells are bent onto the input afterwards, of which the
-/// distance of flat triangles is not what they will err by.
+/// The same, and where that takes half as many triangles again as are asked for, within the first of @p looser_mm;
+/// where that takes twice as many, within the next. For a surface whose cells are bent onto the input afterwards, of
+/// which the distance of flat triangles is not what they will err by.
 /// @param looser_mm  ascending
 /// @param options  out: max_distance_mm is the bound that holds
 DecimateResult decimate_within(const reconstruction::Surface& in, const std::vector<double>& looser_mm,

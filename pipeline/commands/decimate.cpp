@@ -50,10 +50,11 @@ class DecimateTool : public Tool {
                    "default")
         ->check(CLI::Range(1, 2))
         ->capture_default_str();
-    app.add_option("--max-distance-mm", max_distance_mm_,
-                   "bound on the distance to the input, either way, mm, > 0; default: 1, and of a surface of more than "
-                   "900 cm2 as much more as it is larger, up to 3; --order 2: twice that where it "
-                   "would take half as many triangles again as are asked for, three times where that takes twice as many");
+    app.add_option(
+        "--max-distance-mm", max_distance_mm_,
+        "bound on the distance to the input, either way, mm, > 0; default: 1, and of a surface of more than "
+        "900 cm2 as much more as it is larger, up to 3; --order 2: twice that where it "
+        "would take half as many triangles again as are asked for, three times where that takes twice as many");
     app.add_option("--faces", options_.target_faces, "instead: about so many quads and lone triangles, >= 50");
     app.add_option("--edge-mm", options_.edge_mm, "instead: edge length, mm, > 0");
     app.add_option("--method", method_, "quads, or triangles of one size")

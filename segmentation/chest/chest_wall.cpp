@@ -5,8 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
-#include <optional>
+#include <utility>
 
 #include "common/error.h"
 #include "segmentation/chest/boundary_cost.h"
@@ -74,9 +75,10 @@ void hold_back(const FrontSkin& front, const ChestWall& wall, const RayProfiles&
   }
 }
 
-/// The superellipses whose border is cheapest, taken over a few millimetres to either side: no chest is one.
-std::vector<Superellipse> fit_superellipses(const RayProfiles& profiles, const std::vector<float>& costs,
-                                            const ChestWall& wall, const ChestWallOptions& options) {
+/// The superellipses whose border is cheapest, taken over a few millimetres to either side: no chest is one. By their
+/// widths, as of superellipses_with_plates.
+std::vector<std::vector<Superellipse>> fit_superellipses(const RayProfiles& profiles, const std::vector<float>& costs,
+                                                         const ChestWall& wall, const ChestWallOptions& options) {
   const int blur = static_cast<int>(superellipse_blur_mm / RayProfiles::step_mm), n = profiles.count;
   std::vector<float> near(costs.size());
 #pragma omp parallel for schedule(static)
@@ -103,7 +105,7 @@ std::vector<Superellipse> fit_superellipses(const RayProfiles& profiles, const s
   const double middle_z_mm = wall.z(profiles.levels() / 2);
   if (options.border == ChestWallOptions::Border::line)
     return superellipses_with_plates(cost, options.centre_depth_mm, middle_z_mm);
-  return {best_superellipse(cost, options.centre_depth_mm, middle_z_mm)};
+  return {{best_superellipse(cost, options.centre_depth_mm, middle_z_mm)}};
 }
 
 /// The radius nearest to `radius` at which the grey rises through the half-way level; `radius` when there is none.
@@ -188,6 +190,28 @@ double look_closer(const GreyImage& image, const Mask& body, const FrontSkin& fr
   return wall.cost.isNaN().select(0, wall.cost).sum();
 }
 
+/// The wall along the cheapest border that is found from one of the shapes: first which width it has, from the
+/// likeliest of each, then which of that width.
+ChestWall closest_look(const GreyImage& image, const Mask& body, const FrontSkin& front,
+                       const ChestWallOptions& options, const std::vector<std::vector<Superellipse>>& of_widths,
+                       ChestWall wall) {
+  ChestWall best;
+  double least = std::numeric_limits<double>::infinity();
+  const auto is_better = [&](const Superellipse& shape) {
+    wall.superellipse = shape;
+    const double cost = look_closer(image, body, front, options, wall);
+    if (cost >= least) return false;
+    best = wall;
+    least = cost;
+    return true;
+  };
+  const std::vector<Superellipse>* width = &of_widths.front();
+  for (const std::vector<Superellipse>& shapes : of_widths)
+    if (is_better(shapes.front())) width = &shapes;
+  for (std::size_t n = 1; n < width->size(); ++n) is_better((*width)[n]);
+  return best;
+}
+
 void check(const ChestWallOptions& o) {
   if (!(o.bright > o.dark))
     throw InputError(fmt::format("chest_wall: bright = {} must be above dark = {}", o.bright, o.dark));
@@ -235,24 +259,15 @@ ChestWall find_chest_wall(const GreyImage& image, const Mask& body, const Torso&
   if (lines) blur_profiles(profiles, first_look.angles, first_look.levels);
   std::vector<float> costs = boundary_costs(profiles, options);
   hold_back(front, wall, profiles, options, costs);
-  const std::vector<Superellipse> shapes = fit_superellipses(profiles, costs, wall, options);
-  wall.superellipse = shapes.front();
+  const std::vector<std::vector<Superellipse>> shapes = fit_superellipses(profiles, costs, wall, options);
   if (!lines) {
+    wall.superellipse = shapes.front().front();
     settle(profiles, costs, options, wall);
     refine(image, options, wall);
     return wall;
   }
   wall.radius_mm.resize(profiles.angles(), profiles.levels());
-  std::optional<ChestWall> best;
-  double least = 0;
-  for (const Superellipse& shape : shapes) {
-    wall.superellipse = shape;
-    const double cost = look_closer(image, body, front, options, wall);
-    if (best && cost >= least) continue;
-    best = wall;
-    least = cost;
-  }
-  return *best;
+  return closest_look(image, body, front, options, shapes, std::move(wall));
 }
 
 }  // namespace supine::segmentation

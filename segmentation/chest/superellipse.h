@@ -29,10 +29,13 @@ struct Superellipse {
 Superellipse best_superellipse(const std::function<double(const Superellipse&)>& cost, double centre_depth_mm,
                                double middle_z_mm);
 
-/// The best of narrow, middling and wide chests, each with or without plates of up to 15 mm: where the sides are hardly
-/// seen, which of them is right shows only along the border itself.
+/// Narrow, middling and wide chests, each as the best of it is without plates and with plates of 4 to 15 mm, whose
+/// outer edge is 75 to 120 mm from the middle line: with any lower end, with one 15 to 45 mm under the middle level,
+/// and with one 40 to 70 mm. Where the sides are hardly seen and the sum of costs is coarse, which of them is right
+/// shows only along the border itself.
 /// @param cost, centre_depth_mm, middle_z_mm  as for best_superellipse
-std::vector<Superellipse> superellipses_with_plates(const std::function<double(const Superellipse&)>& cost,
-                                                    double centre_depth_mm, double middle_z_mm);
+/// @return  for each width, the one with the lowest sum first
+std::vector<std::vector<Superellipse>> superellipses_with_plates(const std::function<double(const Superellipse&)>& cost,
+                                                                 double centre_depth_mm, double middle_z_mm);
 
 }  // namespace supine::segmentation

@@ -24,11 +24,12 @@ Superellipse nearest(const Superellipse& wanted) {
   const auto cost = [&](const Superellipse& shape) { return distance_mm(shape, wanted); };
   Superellipse best;
   double least = INFINITY;
-  for (const Superellipse& shape : superellipses_with_plates(cost, centre_depth_mm, middle_z_mm))
-    if (cost(shape) < least) {
-      least = cost(shape);
-      best = shape;
-    }
+  for (const auto& of_width : superellipses_with_plates(cost, centre_depth_mm, middle_z_mm))
+    for (const Superellipse& shape : of_width)
+      if (cost(shape) < least) {
+        least = cost(shape);
+        best = shape;
+      }
   return best;
 }
 
@@ -51,10 +52,32 @@ TEST(Superellipse, PlateStandsOutToTheFrontBetweenItsEdges) {
 TEST(Superellipse, ChestsWithAndWithoutMusclesAreFound) {
   for (const Superellipse& wanted :
        {Superellipse{155, 78, 0.1, 2.4, middle_z_mm, 13, 95}, Superellipse{125, 66, -0.2, 2.2, middle_z_mm, 8, 85},
+        Superellipse{150, 72, 0.1, 2.4, middle_z_mm, 9, 90, middle_z_mm - 45},
         Superellipse{165, 82, 0, 2.8, middle_z_mm, 0, 95}}) {
     const Superellipse found = nearest(wanted);
     EXPECT_LT(distance_mm(found, wanted), 1.5) << wanted.half_width_mm;
     EXPECT_NEAR(found.plate_mm, wanted.plate_mm, 4) << wanted.half_width_mm;
+  }
+}
+
+TEST(Superellipse, TheLikeliestOfAWidthComesFirstAndPlatesEndWhereMusclesDo) {
+  const Superellipse wanted{155, 78, 0.1, 2.4, middle_z_mm, 13, 95};
+  const auto cost = [&](const Superellipse& shape) { return distance_mm(shape, wanted); };
+  const auto of_widths = superellipses_with_plates(cost, centre_depth_mm, middle_z_mm);
+  EXPECT_EQ(of_widths.size(), 3);
+  for (const auto& shapes : of_widths) {
+    int high = 0, low = 0;
+    for (std::size_t n = 0; n < shapes.size(); ++n) {
+      if (n > 0) EXPECT_LE(cost(shapes[n - 1]), cost(shapes[n]));
+      if (shapes[n].plate_mm == 0) continue;
+      EXPECT_GE(shapes[n].plate_mm, 4);
+      EXPECT_LE(shapes[n].plate_edge_mm, 120);
+      const double under_mm = middle_z_mm - shapes[n].plate_low_mm;
+      high += under_mm >= 15 && under_mm <= 45;
+      low += under_mm >= 40 && under_mm <= 70;
+    }
+    EXPECT_GE(high, 1);
+    EXPECT_GE(low, 1) << "by the sum alone all these muscles would end below the image";
   }
 }
 
@@ -67,9 +90,9 @@ TEST(Superellipse, SidesThatAreNotSeenLeaveNarrowAndWideChestsToChooseFrom) {
     return sum;
   };
   double narrowest = INFINITY, widest = 0;
-  for (const Superellipse& shape : superellipses_with_plates(front_alone, centre_depth_mm, middle_z_mm)) {
-    narrowest = std::min(narrowest, shape.half_width_mm);
-    widest = std::max(widest, shape.half_width_mm);
+  for (const auto& of_width : superellipses_with_plates(front_alone, centre_depth_mm, middle_z_mm)) {
+    narrowest = std::min(narrowest, of_width.front().half_width_mm);
+    widest = std::max(widest, of_width.front().half_width_mm);
   }
   EXPECT_LT(narrowest, 130);
   EXPECT_GT(widest, 140);
