@@ -153,8 +153,8 @@ void read_pose_landmarks(Run& run, MeasuredCase& in, const std::vector<Pose>& po
   }
 }
 
-/// Where a model has the landmarks of a pose that can say whether they may lie there. One that is stiffer than the given
-/// one, because that has no equilibrium, moves too little: of its places those about the landmarks' mean.
+/// Where a model has the landmarks of a pose that can say whether they may lie there. One that is stiffer than the
+/// given one, because that has no equilibrium, moves too little: of its places those about the landmarks' mean.
 Points places_to_judge_by(const MeasuredCase& in, const std::string& pose, const Points& measured) {
   Points places = predicted_places(in, pose);
   if (in.carrying_modulus_kpa && places.rows() > 0)
