@@ -154,11 +154,14 @@ void read_pose_landmarks(Run& run, MeasuredCase& in, const std::vector<Pose>& po
 }
 
 /// Where a model has the landmarks of a pose that can say whether they may lie there. One that is stiffer than the
-/// given one, because that has no equilibrium, moves too little: of its places those about the landmarks' mean.
+/// given one, because that has no equilibrium, moves too little: its places are moved to
+/// the landmarks' mean, as far as a breast may be off.
 Points places_to_judge_by(const MeasuredCase& in, const std::string& pose, const Points& measured) {
+  constexpr double furthest_mm = 100;  // that a breast lies, as a whole, from where a stiff one does
   Points places = predicted_places(in, pose);
-  if (in.carrying_modulus_kpa && places.rows() > 0)
-    places.rowwise() += measured.colwise().mean() - places.colwise().mean().eval();
+  if (!in.carrying_modulus_kpa || places.rows() == 0) return places;
+  const Eigen::RowVector3d way = measured.colwise().mean() - places.colwise().mean();
+  places.rowwise() += way * (furthest_mm / std::max(furthest_mm, way.norm()));
   return places;
 }
 

@@ -89,6 +89,23 @@ TEST_F(Calibrate, BeginsStifferWhereTheModelCarriesNothingAndEndsWhereAStiffStar
   EXPECT_NEAR(fitted_from("0.02"), stiff, 0.02 * stiff);
 }
 
+TEST_F(Calibrate, AStandInForAModelThatCarriesNothingJudgesLandmarksAboutTheirMean) {
+  write_text(folder() / "prone.csv", "name,x,y,z\nnipple,0,-39,0\n");
+  write_text(folder() / "case.toml", replaced(read_text(folder() / "case.toml"), "supine.ply\"\n",
+                                              "supine.ply\"\nlandmarks = \"supine.csv\"\n") +
+                                         "[landmarks]\nprone = \"prone.csv\"\n");
+  const auto is_refused = [this](const std::string& kpa, const std::string& z_mm) {
+    write_text(folder() / "supine.csv", "name,x,y,z\nnipple,0,-31.5," + z_mm + "\n");
+    write_text(folder() / "model.toml", "[breast]\nlaw = \"neo_hookean\"\nyoung_modulus_kpa = { value = " + kpa +
+                                            ", prior_sd = 0.5, lower = 0.01, upper = 20 }\n");
+    const Finished done = run("calibrate", kpa + "_" + z_mm);
+    return done.err.find("from where the model has it") != std::string::npos;
+  };
+  EXPECT_TRUE(is_refused("1.5", "80"));
+  EXPECT_FALSE(is_refused("0.02", "80")) << "a stiff body moves too little";
+  EXPECT_TRUE(is_refused("0.02", "250")) << "no breast moves as far";
+}
+
 TEST_F(Calibrate, WritesTheModelWithCommentsAndFittedNumbers) {
   ASSERT_LE(run("calibrate", "fit").code, 1);
   const std::string text = bytes("fit/model.toml");
