@@ -68,7 +68,9 @@ TEST(Superellipse, TheLikeliestOfAWidthComesFirstAndPlatesEndWhereMusclesDo) {
   for (const auto& shapes : of_widths) {
     int high = 0, low = 0;
     for (std::size_t n = 0; n < shapes.size(); ++n) {
-      if (n > 0) EXPECT_LE(cost(shapes[n - 1]), cost(shapes[n]));
+      if (n > 0) {
+        EXPECT_LE(cost(shapes[n - 1]), cost(shapes[n]));
+      }
       if (shapes[n].plate_mm == 0) continue;
       EXPECT_GE(shapes[n].plate_mm, 4);
       EXPECT_LE(shapes[n].plate_edge_mm, 120);
