@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: AGPL-3.0-or-later
 // Made series of drawn torsos through the automatic recipes, against what they were made of.
 //   bench_mri_series t1|fatsat|t2|both|second FIRST COUNT [FOLDER [GLAND]]
-//     a row per seed, then medians; the worst are drawn in FOLDER; both: T1, the fat-suppressed one beside it; second:
-//     the fat-suppressed one, T1 beside it; GLAND: a labelled breast whose gland they carry (breastPhantom)
+//     a row per seed, then medians; both: T1, the fat-suppressed one beside it; second: the fat-suppressed one, T1
+//     beside it; GLAND: a labelled breast whose gland they carry (breastPhantom). What misses an aim is drawn in
+//     FOLDER: four slices with what was found, under them the same with what is there
 //   bench_mri_series planted SEED                        planted failures and what is said
 #include <fmt/format.h>
 
@@ -95,6 +96,24 @@ bool holds_ligament(const phantom::Torso& torso, const segmentation::Grid& grid,
 }
 
 /// Between the levels of the breasts and in front of a reader's end: there truth and result mean the same.
+bool is_compared(const phantom::Torso& torso, const Eigen::Vector3d& p) {
+  return p.z() >= torso.low_z_mm() && p.z() <= torso.high_z_mm() && p.y() <= torso.back_y_mm() - 10;
+}
+
+/// What is there, as a tissue that a recipe labels.
+segmentation::Tissue true_tissue(std::uint8_t stuff) {
+  switch (static_cast<phantom::Stuff>(stuff)) {
+    case phantom::Stuff::gland:
+      return segmentation::Tissue::gland;
+    case phantom::Stuff::fat:
+    case phantom::Stuff::skin:
+    case phantom::Stuff::vessel:
+      return segmentation::Tissue::adipose;
+    default:
+      return segmentation::Tissue::air;
+  }
+}
+
 Score score(const phantom::Torso& torso, const phantom::MadeSeries& made, const segmentation::RecipeResult& result) {
   const segmentation::Grid& grid = made.image.grid;
   const std::size_t count = grid.count();
@@ -105,11 +124,10 @@ Score score(const phantom::Torso& torso, const phantom::MadeSeries& made, const 
       for (int i = 0; i < grid.size.x(); ++i) {
         const std::size_t n = grid.index(i, j, k);
         const Eigen::Vector3d p = grid.point(Eigen::Vector3d(i, j, k));
-        if (p.z() < torso.low_z_mm() || p.z() > torso.high_z_mm() || p.y() > torso.back_y_mm() - 10) continue;
-        const auto stuff = static_cast<phantom::Stuff>(made.truth.voxels[n]);
-        true_gland[n] = stuff == phantom::Stuff::gland;
-        true_breast[n] = true_gland[n] || stuff == phantom::Stuff::fat || stuff == phantom::Stuff::skin ||
-                         stuff == phantom::Stuff::vessel;
+        if (!is_compared(torso, p)) continue;
+        const segmentation::Tissue is = true_tissue(made.truth.voxels[n]);
+        true_gland[n] = is == segmentation::Tissue::gland;
+        true_breast[n] = is != segmentation::Tissue::air;
         const auto tissue = static_cast<segmentation::Tissue>(result.labels.voxels[n]);
         gland[n] = tissue == segmentation::Tissue::gland;
         ligament[n] = gland[n] && !true_gland[n] && holds_ligament(torso, grid, i, j, k);
@@ -160,9 +178,49 @@ segmentation::GreyImage beside(const phantom::Torso& torso, std::uint64_t seed, 
   return image;
 }
 
-void draw(const phantom::MadeSeries& made, const segmentation::LabelImage& labels, const std::string& file) {
-  std::vector<double> places;
-  segmentation::write_png(segmentation::overlay(labels, &made.image, 2, {}, places), file);
+/// The levels of the breasts alone: both rows of a picture then show the same slices.
+template <class Voxel>
+std::vector<Voxel> levels(const std::vector<Voxel>& voxels, const segmentation::Grid& grid, int first, int last) {
+  const auto slice = static_cast<std::ptrdiff_t>(grid.index(0, 0, 1));
+  return {voxels.begin() + first * slice, voxels.begin() + (last + 1) * slice};
+}
+
+/// Four slices with what was found, under them the same with what is there.
+void draw(const phantom::Torso& torso, const phantom::MadeSeries& made, const std::vector<std::uint8_t>& found,
+          const std::string& file) {
+  const segmentation::Grid& grid = made.image.grid;
+  std::vector<std::uint8_t> truth(found.size()), labels = found;
+  for (int k = 0; k < grid.size.z(); ++k)
+    for (int j = 0; j < grid.size.y(); ++j)
+      for (int i = 0; i < grid.size.x(); ++i) {
+        const std::size_t n = grid.index(i, j, k);
+        if (is_compared(torso, grid.point(Eigen::Vector3d(i, j, k))))
+          truth[n] = static_cast<std::uint8_t>(true_tissue(made.truth.voxels[n]));
+        else
+          labels[n] = 0;
+      }
+  const auto shows = [&grid](const std::vector<std::uint8_t>& tissues, int from, int to) {
+    const std::vector<std::uint8_t> part = levels(tissues, grid, from, to);
+    return std::any_of(part.begin(), part.end(), [](std::uint8_t tissue) { return tissue != 0; });
+  };
+  int first = 0, last = grid.size.z() - 1;
+  const bool refused = !shows(labels, first, last);
+  const auto is_drawn = [&](int k) { return shows(truth, k, k) && (refused || shows(labels, k, k)); };
+  while (first < last && !is_drawn(first)) ++first;
+  while (last > first && !is_drawn(last)) --last;
+  segmentation::GreyImage grey{grid, levels(made.image.voxels, grid, first, last)};
+  grey.grid.size.z() = last - first + 1;
+  grey.grid.origin_mm = grid.point(Eigen::Vector3d(0, 0, first));
+  segmentation::Picture picture;
+  for (const auto* shown : {&labels, &truth}) {
+    std::vector<double> places;
+    const segmentation::Picture row =
+        segmentation::overlay({grey.grid, levels(*shown, grid, first, last)}, &grey, 2, {1, 4, 4}, places);
+    picture.width = row.width;
+    picture.height += row.height;
+    picture.rgb.insert(picture.rgb.end(), row.rgb.begin(), row.rgb.end());
+  }
+  segmentation::write_png(picture, file);
 }
 
 struct Wanted {
@@ -203,13 +261,13 @@ int table(const Wanted& wanted) {
       wall.push_back(s.wall_median);
       wall95.push_back(s.wall_95);
       if (s.true_gland_ml > 0) volume.push_back(s.gland_ml / s.true_gland_ml);
-      if (!wanted.folder.empty() && (s.breast < 0.9 || s.gland < 0.6))
-        draw(made, result.labels, fmt::format("{}/{}.png", wanted.folder, seed));
+      if (!wanted.folder.empty() && (s.breast < 0.95 || s.gland < 0.75 || s.wall_median > 3 || s.wall_95 > 8))
+        draw(torso, made, result.labels.voxels, fmt::format("{}/{}.png", wanted.folder, seed));
     } catch (const InputError& error) {
       ++failed;
       fmt::print("| {} | refused: {} |\n", seed, error.what());
       if (!wanted.folder.empty())
-        draw(made, {made.truth.grid, std::vector<std::uint8_t>(made.truth.voxels.size(), 0)},
+        draw(torso, made, std::vector<std::uint8_t>(made.truth.voxels.size(), 0),
              fmt::format("{}/{}_refused.png", wanted.folder, seed));
     }
     std::fflush(stdout);

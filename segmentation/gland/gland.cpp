@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "segmentation/gland/border_sharpness.h"
 #include "segmentation/gland/fat_level.h"
 #include "segmentation/gland/fat_shift.h"
 #include "segmentation/gland/gland_outline.h"
@@ -18,6 +19,7 @@ namespace {
 constexpr double under_skin_mm = 8;  // below the rind: fat in every breast, but for the nipple
 constexpr double clear_of_noise = 4, pure_percentile = 0.98;
 constexpr std::size_t fewest_pure = 100;
+constexpr double beside_failed_mm = 4;  // where suppression fails; there is no gland either
 struct Range {
   double usual, lowest, highest;
 };
@@ -87,6 +89,18 @@ std::optional<Eigen::Vector3d> put_back(const Grid& grid, SeriesContrast& series
   return moved->fat_mm;
 }
 
+/// Takes fat whose suppression fails little by little from what is surely gland, and it and what lies beside it from
+/// where gland may be. @return ml of it
+double leave_out_failed(const FatLevel& fat, const Grid& grid, Mask& sure, Mask& inner) {
+  const Mask sharp = with_sharp_borders(sure, inner, fat, grid);
+  Mask failed(sure.size());
+  for (std::size_t n = 0; n < failed.size(); ++n) failed[n] = sure[n] && !sharp[n];
+  const Mask beside = dilate(failed, grid, beside_failed_mm);
+  for (std::size_t n = 0; n < failed.size(); ++n) inner[n] = inner[n] && (sharp[n] || !beside[n]);
+  sure = sharp;
+  return volume_ml(failed, grid);
+}
+
 void note_shading(const FatLevel& fat, const Mask& inner, GlandResult& result) {
   for (std::size_t n = 0; n < inner.size(); ++n)
     if (inner[n]) {
@@ -125,8 +139,9 @@ GlandResult find_gland(const GreyImage& image, const GlandPlace& place, const Gl
       classify_gland(fat.contrast, fat.deviation, inner, grid, series.pure, options.neighbourhood);
   Mask looks(inner.size());
   for (std::size_t n = 0; n < looks.size(); ++n) looks[n] = classes.probability[n] > 0.5f;
-  const Mask sure = where_gland_lies(looks, place, depths, grid, options);
+  Mask sure = where_gland_lies(looks, place, depths, grid, options);
   result.aside_ml = volume_ml(looks, grid) - volume_ml(sure, grid);
+  if (options.contrast == GlandOptions::Contrast::bright) result.failed_ml += leave_out_failed(fat, grid, sure, inner);
   result.gland = outline_gland(sure, where_gland_may_lie(inner, place, depths, grid, options), fat, grid, options);
   result.fraction.assign(inner.size(), 0);
   Mask near(sure.size());

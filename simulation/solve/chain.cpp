@@ -118,6 +118,15 @@ std::string modulus_advice(const Model& model, double load) {
   return ". " + guess + "supine-simulate --find-modulus finds the least that does";
 }
 
+/// What carries more at the same moduli and is not in the model yet.
+std::string setting_advice(const Model& model) {
+  std::string advice;
+  if (model.skin.bending_share == 0) advice += ". skin.bending_share = 3 lets creasing skin resist bending";
+  if (model.breast.law == BulkLaw::corotational || model.breast.law == BulkLaw::corotational_qr)
+    advice += ". breast.law = \"neo_hookean\" stiffens in compression";
+  return advice;
+}
+
 Scene scene_of(const Mechanics& mechanics, const std::string& pose) {
   return {.mesh = mechanics.mesh(), .anatomy = mechanics.anatomy(), .layout = mechanics.layout(), .pose = pose};
 }
@@ -162,7 +171,7 @@ ChainSolution Chain::solve(const Model& model, const ChainSolution* near, Invers
   try {
     return solve_all(model, near, method);
   } catch (const NoEquilibrium& failure) {
-    throw NoEquilibrium(failure.what() + modulus_advice(model, failure.load()), failure.load());
+    throw NoEquilibrium(failure.what() + setting_advice(model) + modulus_advice(model, failure.load()), failure.load());
   }
 }
 

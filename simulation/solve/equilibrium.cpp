@@ -174,8 +174,8 @@ std::string EquilibriumSolver::failure(const Attempt& last, double load, const P
   }
   return fmt::format(
       "{}: no equilibrium found beyond {:.0f} % of gravity ({}{}). A softer tissue than this shape can carry, or a "
-      "poor mesh there: raise breast.young_modulus_kpa or skin.young_modulus_kpa, let creasing skin resist bending "
-      "(skin.bending_share = 3), use law = \"neo_hookean\", or look at the mesh with supine-tetrahedralise --check",
+      "poor mesh there: raise breast.young_modulus_kpa or skin.young_modulus_kpa, or look at the mesh with "
+      "supine-tetrahedralise --check",
       what_, 100 * load, termination_words(last.end, last.iterations, last.residual_share), place);
 }
 

@@ -72,6 +72,27 @@ TEST(CarryingModulus, AFailureNamesAModulusAndHowFarItCame) {
   }
 }
 
+TEST(CarryingModulus, AFailureNamesWhatTheModelDoesNotHaveYet) {
+  const testing::TestScene& scene = testing::dome_scene();
+  const auto said = [&scene](const Model& model) -> std::string {
+    try {
+      Chain(scene.mesh, scene.anatomy, model, poses).solve(model);
+    } catch (const NoEquilibrium& failure) {
+      return failure.what();
+    }
+    return "carried";
+  };
+  Model model = too_soft();
+  const std::string without = said(model);
+  for (const char* advice : {"skin.bending_share = 3 lets", "breast.law = \"neo_hookean\""})
+    EXPECT_NE(without.find(advice), std::string::npos) << without;
+  model.breast.law = BulkLaw::neo_hookean;
+  model.skin.bending_share = 0.1;
+  const std::string with = said(model);
+  for (const char* advice : {"bending_share", "breast.law"}) EXPECT_EQ(with.find(advice), std::string::npos) << with;
+  EXPECT_NE(with.find("no equilibrium found beyond"), std::string::npos) << with;
+}
+
 TEST(Volume, OfTheDomeIsThatOfItsCellsWhateverTheOrder) {
   const testing::TestScene& linear = testing::dome_scene(1);
   const meshing::TetMesh quadratic = testing::quadratic(linear.mesh);
