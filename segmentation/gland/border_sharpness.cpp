@@ -6,26 +6,17 @@
 #include <cmath>
 
 #include "segmentation/blur.h"
+#include "segmentation/gland/contrast_around.h"
 
 namespace supine::segmentation {
 namespace {
 
-constexpr double single_voxel_mm = 0.8;          // noise of single voxels is smoothed by this much
-constexpr double around_mm = 8, borders_mm = 6;  // standard deviations of "around there", of "borders nearby"
-constexpr double over_mm = 2;                    // that a border is steep
-constexpr float least_sharpness = 0.42F;         // made series: gland 0.54 to 0.8, failed suppression 0.2 to 0.3
-constexpr float least_weight = 1e-6F;            // of a mean; farther from any border nothing is said
+constexpr double nearby_mm = 6;           // standard deviation of "borders nearby"
+constexpr double over_mm = 2;             // that a border is steep
+constexpr float least_sharpness = 0.42F;  // made series: gland 0.54 to 0.8, failed suppression 0.2 to 0.3
+constexpr float least_weight = 1e-6F;     // of borders; farther from any nothing is said
 
 std::array<std::size_t, 3> strides(const Grid& grid) { return {1, grid.index(0, 1, 0), grid.index(0, 0, 1)}; }
-
-/// The mean of what has a weight, over a Gaussian around each voxel; NaN where there is none.
-std::vector<float> mean_around(std::vector<float> weighted, std::vector<float> weight, const Grid& grid, double mm) {
-  gaussian_blur(weighted, grid, mm);
-  gaussian_blur(weight, grid, mm);
-  for (std::size_t n = 0; n < weight.size(); ++n)
-    weighted[n] = weight[n] > least_weight ? weighted[n] / weight[n] : NAN;
-  return weighted;
-}
 
 /// Calls @p work of every voxel of the mask that is not on the image's edge.
 template <class Work>
@@ -66,38 +57,26 @@ float steepest_beside(std::size_t n, const std::vector<float>& steep, const std:
   return most;
 }
 
-/// The contrast of the mask around each voxel; what shows more of it counts more.
-std::vector<float> usual_contrast(const Mask& looks, const std::vector<float>& contrast, const Grid& grid) {
-  std::vector<float> sum(looks.size(), 0), weight(looks.size(), 0);
-  for (std::size_t n = 0; n < looks.size(); ++n)
-    if (looks[n]) {
-      weight[n] = std::max(0.0F, contrast[n]);
-      sum[n] = weight[n] * weight[n];
-    }
-  return mean_around(std::move(sum), std::move(weight), grid, around_mm);
-}
-
 }  // namespace
 
 Mask with_sharp_borders(const Mask& looks, const Mask& inner, const FatLevel& fat, const Grid& grid) {
-  std::vector<float> contrast(looks.size(), 0);
-  for (std::size_t n = 0; n < looks.size(); ++n)
-    if (inner[n]) contrast[n] = fat.contrast[n];
-  contrast = mean_around(std::move(contrast), {inner.begin(), inner.end()}, grid, single_voxel_mm);
-  const std::vector<float> steep = steepness(inner, contrast, grid), usual = usual_contrast(looks, contrast, grid);
+  const std::vector<float> contrast = smooth_contrast(inner, fat.contrast, grid),
+                           steep = steepness(inner, contrast, grid), usual = usual_contrast(looks, contrast, grid);
   std::vector<float> sharpness(looks.size(), 0), borders(looks.size(), 0);
   const auto stride = strides(grid);
   for_each_inside(looks, grid, [&](std::size_t n) {
     const bool is_border = std::any_of(stride.begin(), stride.end(), [&](std::size_t s) {
       return (inner[n - s] && !looks[n - s]) || (inner[n + s] && !looks[n + s]);
     });
-    if (!is_border || !(usual[n] > 0)) return;
+    if (!is_border || usual[n] == 0) return;
     sharpness[n] = static_cast<float>(over_mm) * steepest_beside(n, steep, stride) / usual[n];
     borders[n] = 1;
   });
-  sharpness = mean_around(std::move(sharpness), std::move(borders), grid, borders_mm);
+  gaussian_blur(sharpness, grid, nearby_mm);
+  gaussian_blur(borders, grid, nearby_mm);
   Mask sharp = looks;
-  for (std::size_t n = 0; n < sharp.size(); ++n) sharp[n] = sharp[n] && !(sharpness[n] < least_sharpness);
+  for (std::size_t n = 0; n < sharp.size(); ++n)
+    sharp[n] = looks[n] && (borders[n] <= least_weight || sharpness[n] >= least_sharpness * borders[n]);
   return sharp;
 }
 
