@@ -11,8 +11,9 @@ namespace supine::segmentation {
 ///
 /// At each border voxel the steepest contrast beside it is taken over 2 mm, as a share of the contrast of what looks
 /// like gland around there; the mean of the borders around a voxel decides.
-/// @param looks  like gland
+/// @param looks  like gland; of grid.count() voxels, as inner, fat.contrast and what is returned
 /// @param inner  where the contrast is known; holds looks
+/// @return looks less what has no sharp border; what is far from any border stays
 Mask with_sharp_borders(const Mask& looks, const Mask& inner, const FatLevel& fat, const Grid& grid);
 
 }  // namespace supine::segmentation

@@ -66,7 +66,8 @@ struct GlandResult {
 ///    no gland is, all is fat.
 /// 2. Classes with neighbourhood (classify_gland); the share of gland in each voxel is its contrast over that of pure
 ///    gland.
-/// 3. Place: not in skin, chest or failed suppression; inside the fan from the nipple to the chest; no small islands.
+/// 3. Place: not in skin, chest or failed suppression (bright: by its level, and where borders are not sharp,
+///    with_sharp_borders); inside the fan from the nipple to the chest; no small islands.
 /// 4. Labelled is what a reader outlines around it (outline_gland); the share is not that of the filled gaps.
 /// In one dark series whose fat the scanner moved, 2 begins with the share of gland where it is (moved_fat.h).
 /// With a second series 1 is done for each by itself, and the shares they say are taken together (share_by_both); where

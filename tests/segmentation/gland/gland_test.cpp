@@ -135,6 +135,40 @@ TEST(Gland, LabelsWhatIsMostlyGlandAndKeepsTheShareOfTheRest) {
   EXPECT_GT(std::count(any.gland.begin(), any.gland.end(), 1), 0.9 * (core + shell_voxels));
 }
 
+/// The same breast with its fat suppressed, which fails little by little around a place at its side.
+TEST(Gland, FatWhoseSuppressionFailsLittleByLittleIsNotGland) {
+  const Grid grid = cube(56, 2);
+  GreyImage image{grid, {}};
+  Mask body, breast, chest, ball, fails;
+  std::mt19937 random(11);
+  std::normal_distribution<float> noise(0, 4);
+  for (int k = 0; k < 56; ++k)
+    for (int j = 0; j < 56; ++j)
+      for (int i = 0; i < 56; ++i) {
+        const bool inside = std::hypot(i - 28, k - 28) < 23 && j > 4;
+        const double from_place_mm = 2 * std::hypot(i - 44, j - 30, k - 28);
+        ball.push_back(std::hypot(i - 24, j - 20, k - 28) < 5);
+        fails.push_back(inside && from_place_mm < 12);
+        body.push_back(inside);
+        chest.push_back(inside && j >= 48);
+        breast.push_back(inside && j < 48);
+        const double bright = (ball.back() ? 150 : 0) + 90 * std::exp(-std::pow(from_place_mm / 14, 2));
+        image.voxels.push_back(static_cast<float>(inside ? 100 + bright : 0) + noise(random));
+      }
+  GlandOptions options;
+  options.contrast = GlandOptions::Contrast::bright;
+  const GlandResult result = find_gland(image, {body, breast, chest, -1, 40, 200}, options);
+  double in_ball = 0, of_ball = 0, failed = 0;
+  for (std::size_t n = 0; n < ball.size(); ++n) {
+    in_ball += ball[n] && result.gland[n];
+    of_ball += ball[n];
+    failed += fails[n] && result.gland[n];
+  }
+  EXPECT_GT(in_ball / of_ball, 0.95);
+  EXPECT_EQ(failed, 0);
+  EXPECT_GT(result.failed_ml, 1);
+}
+
 /// A slab of fat on one grid, whose contrast the tests draw.
 struct Slab {
   Grid grid = cube(40, 1);
